@@ -67,6 +67,8 @@ class LockstepClock:
         self._now_s = simulator.time_s
         self.overhear: Callable[[float, bytes], None] | None = None
         """Called with the time to which the world advances, and the bytes that the companion has written."""
+        self.delivered: Callable[[float, bytes], None] | None = None
+        """Called with the time, and the bytes that the companion is given then."""
 
     def now_s(self) -> float:
         """Simulated seconds since the autopilot booted."""
@@ -81,7 +83,10 @@ class LockstepClock:
             self.overhear(time_s, said)
         self._vehicle_end.receive(self._up.passed(self._now_s, said))
         self._simulator.advance_to_s(time_s)
-        self._companion_end.write(self._down.passed(time_s, self._vehicle_end.take()))
+        arrived = self._down.passed(time_s, self._vehicle_end.take())
+        if self.delivered is not None:
+            self.delivered(time_s, arrived)
+        self._companion_end.write(arrived)
         if self._vehicle_end.dropped:
             # The autopilot has rebooted: connect again at once.
             self._vehicle_end = self._simulator.connect(name="companion")

@@ -8,23 +8,19 @@ from __future__ import annotations
 import re
 from copy import deepcopy
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from companion.mission.sensor_tables import sensors_from, sensors_given
 from companion.planning.registry import UnknownPlannerError, make_planner
-from companion.settings import PlannerSettings, SettingsError
+from companion.settings import PlannerSettings, Settings, SettingsError
 from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
 from companion.storage.toml_file import read_table
-from sitl.faults.fault_file import FaultFileError, load_faults
-from sitl.generators.kinds import GroundKind, is_kind
+from sitl.campaign.worded import NOTHING, OWN, GroundSpec, SensorSpec, faults_of
+from sitl.faults.fault_file import FaultFileError
+from sitl.generators.kinds import GroundKind
 
-NOTHING = "none"
-"""No faults."""
-OWN = "own"
-"""The sensors that the mission names; generated ground is driven with ``USUAL_SENSORS``."""
 SHIPPED = "shipped"
 """The name of the settings without a change."""
 Share = Annotated[float, Field(ge=0.0, le=0.9)]
@@ -34,6 +30,21 @@ MOST_RUNS = 1_000_000
 
 class CampaignError(Exception):
     """A campaign that cannot be driven; the text is one line with file, place and remedy."""
+
+
+class SearchTable(BaseModel):
+    """``[search]``: what ``--search`` moves.
+
+    ``settings``: bounds of more settings than the tunable ones, or other bounds. Things that move are not among what is
+    moved without a word: a rover that moves among things that never yield is touched now and then.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    parts: list[Literal["world", "traffic", "rover", "sensors", "faults", "settings"]] = Field(
+        default=["world", "rover", "sensors", "faults", "settings"], min_length=1
+    )
+    settings: dict[str, Annotated[tuple[float, float], Field(strict=False)]] = Field(default_factory=dict)
 
 
 class CampaignTable(BaseModel):
@@ -54,6 +65,7 @@ class CampaignTable(BaseModel):
     late_s: list[Seconds] = Field(default=[0.0], min_length=1)
     time_limit_s: float = Field(default=1800.0, gt=0.0, le=36000.0)
     settings: dict[str, dict[str, Any]] = Field(default={SHIPPED: {}}, min_length=1)
+    search: SearchTable = SearchTable()
 
 
 def load_campaign(path: Path) -> CampaignTable:
@@ -72,11 +84,10 @@ def load_campaign(path: Path) -> CampaignTable:
     for plan in table.faults:
         _check_faults(path, folder, plan)
     for number, sensors in enumerate(table.sensors, 1):
-        if sensors != OWN:
-            try:
-                sensors_from(sensors_given(sensors), folder, CampaignError)
-            except ValueError as error:
-                raise CampaignError(f"{path}: sensors {number}: {error}") from error
+        try:
+            SensorSpec.of(sensors).check(folder)
+        except ValueError as error:
+            raise CampaignError(f"{path}: sensors {number}: {error}") from error
     return table.model_copy(update={"name": table.name or re.sub(r"[^\w .,+()-]", "-", path.stem)})
 
 
@@ -108,15 +119,31 @@ def _check_names(path: Path, table: CampaignTable) -> None:
                 raise CampaignError(
                     f"{path}: settings.{name}: {section}.{key}: stands in the list {axis}; name it there"
                 )
+    _check_search(path, table.search)
     for axis in ("worlds", "planners", "controllers", "sensors", "faults", "guard", "off_model", "late_s"):
         values_of = getattr(table, axis)
         if len(set(values_of)) < len(values_of):
             raise CampaignError(f"{path}: {axis}: a value stands there twice; each combination is driven once")
 
 
+def _check_search(path: Path, search: SearchTable) -> None:
+    """Its settings are numbers that there are, and their bounds ascend. Raises CampaignError."""
+    for name, (low, high) in search.settings.items():
+        section, _, key = name.partition(".")
+        usual = getattr(getattr(Settings(), section, None), key or "-", None)
+        if isinstance(usual, bool) or not isinstance(usual, int | float):
+            raise CampaignError(f"{path}: search.settings: {name!r:.60} is no number of docs/settings.md")
+        if not low < high:
+            raise CampaignError(f"{path}: search.settings: {name}: {low:g} is not less than {high:g}")
+
+
 def _check_world(path: Path, folder: Path, world: str) -> None:
     """It must be a kind of ground or a mission. Raises CampaignError."""
-    if not is_kind(world) and not (folder / world).is_file():
+    try:
+        ground = GroundSpec.of(world)
+    except ValueError as error:
+        raise CampaignError(f"{path}: worlds: {world!r:.80}: {error}") from error
+    if ground is None and not (folder / world).is_file():
         kinds = ", ".join(GroundKind)
         raise CampaignError(f"{path}: worlds: {world!r:.80} is no kind of ground ({kinds}) and no mission file")
 
@@ -125,6 +152,6 @@ def _check_faults(path: Path, folder: Path, plan: str) -> None:
     """It must be a plan that can be used. Raises CampaignError."""
     if plan != NOTHING:
         try:
-            load_faults(folder / plan)
+            faults_of(plan, folder)
         except FaultFileError as error:
             raise CampaignError(f"{path}: faults: {error}") from error

@@ -16,21 +16,22 @@ from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, R
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
-from sitl.campaign.campaign_file import NOTHING, OWN
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.time_bound import time_bound_s
+from sitl.campaign.wire_watch import WireWatch
+from sitl.campaign.worded import NOTHING, OWN, GroundSpec, SensorSpec, faults_of
 from sitl.experiments.dead_companion import STOOD_M_S
 from sitl.experiments.experiment import GUARD
 from sitl.experiments.off_model import off_model
-from sitl.faults.fault_file import load_faults
-from sitl.generators.kinds import GroundKind, is_kind
-from sitl.generators.made_ground import MadeGround, made
+from sitl.generators.made_ground import MadeGround, NoWayError, made
 from sitl.lockstep import Drive, TrackPoint
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
 from sitl.simulator import ROOM_REACH_M
 from sitl.world.truth import SimStart
 
+NO_GROUND = "no-ground"
+"""The outcome where a kind with these parameters gives no ground with a way."""
 USUAL_SENSORS = "lidar-360"
 """On generated ground."""
 STREAM = 71
@@ -57,8 +58,11 @@ def drive(spec: RunSpec, folder: Path) -> RunResult:
     began_s = processor_s()
     try:
         run, near = prepared(spec, folder), Nearest()
+        watch = WireWatch(run)
         run.run(lambda status: near.look(run), LOOK_S)
-        return _result(run, near.clearance_m, processor_s() - began_s)
+        return _result(run, near.clearance_m, watch, processor_s() - began_s)
+    except NoWayError as error:
+        return RunResult("", NO_GROUND, cpu_s=processor_s() - began_s, said=str(error)[:300])
     except Exception as error:
         if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise KeyboardInterrupt from None  # within a compiled loop
@@ -85,13 +89,21 @@ def settings_of(spec: RunSpec) -> Settings:
 
 def mission_of(spec: RunSpec, folder: Path) -> Mission:
     """The mission that is driven, with the run's sensors."""
-    if is_kind(spec.world):
-        mission = _mission_on(made(GroundKind(spec.world), spec.seed))
-    else:
-        mission = load_mission(folder / spec.world)
-    if spec.sensors == OWN:
+    return _mission_on(_ground_of(spec), spec, folder)
+
+
+def _ground_of(spec: RunSpec) -> MadeGround | None:
+    """None: a mission's file says where it is driven. Raises NoWayError."""
+    ground = GroundSpec.of(spec.world)
+    return None if ground is None else made(ground.kind, spec.seed, ground.given, ground.movers)
+
+
+def _mission_on(ground: MadeGround | None, spec: RunSpec, folder: Path) -> Mission:
+    mission = load_mission(folder / spec.world) if ground is None else _mission_across(ground)
+    sensors = SensorSpec.of(spec.sensors).name
+    if sensors == OWN:
         return mission
-    return with_sensors(mission, str(folder / spec.sensors) if spec.sensors.endswith(".toml") else spec.sensors)
+    return with_sensors(mission, str(folder / sensors) if sensors.endswith(".toml") else sensors)
 
 
 def check_spec(spec: RunSpec, folder: Path) -> None:
@@ -100,14 +112,17 @@ def check_spec(spec: RunSpec, folder: Path) -> None:
 
 
 def _mission_and_scenario(spec: RunSpec, folder: Path) -> tuple[Mission, Scenario]:
-    mission = mission_of(spec, folder)
+    ground = _ground_of(spec)
+    mission = _mission_on(ground, spec, folder)
     scenario = scenario_from_mission(mission)
-    if is_kind(spec.world):
-        ground = made(GroundKind(spec.world), spec.seed)
+    if ground is not None:
         start = SimStart(*ground.start_m, np.pi / 2.0, scenario.start.home)
         scenario = replace(scenario, world=ground.world, start=start)
+    sensors = SensorSpec.of(spec.sensors)
+    if sensors.changes.model_fields_set:
+        scenario = replace(scenario, sensors=sensors.changed(scenario.sensors))
     if spec.faults != NOTHING:
-        scenario = with_faults(scenario, load_faults(folder / spec.faults))
+        scenario = with_faults(scenario, faults_of(spec.faults, folder))
     if spec.guard:
         scenario = replace(scenario, parameters={**scenario.parameters, **GUARD})
     if spec.off_model > 0.0 and mission.rover.turning_radius_m <= 0.0:
@@ -116,7 +131,7 @@ def _mission_and_scenario(spec: RunSpec, folder: Path) -> tuple[Mission, Scenari
     return mission, scenario
 
 
-def _mission_on(ground: MadeGround) -> Mission:
+def _mission_across(ground: MadeGround) -> Mission:
     """From one side of generated ground to the other; nothing but the target is given."""
     place = HomePoint(ground.goal_m[0] - ground.start_m[0], ground.goal_m[1] - ground.start_m[1])
     target = Target("goal", place, 0.0, OnBlocked.SKIP)
@@ -124,7 +139,7 @@ def _mission_on(ground: MadeGround) -> Mission:
     return Mission(f"{ground.kind}", (target,), GridSpec(margin_m=30.0, by_footprint=True), RoverSpec(), sitl=sitl)
 
 
-def _result(run: Drive, clearance_m: float, cpu_s: float) -> RunResult:
+def _result(run: Drive, clearance_m: float, watch: WireWatch, cpu_s: float) -> RunResult:
     report, executor, hits = run.report, run.companion.executor, run.simulator.collisions
     run_into = sum(hit.mover is not None and abs(hit.speed_m_s) < STOOD_M_S for hit in hits)
     statuses = Counter(status for _, status in report.targets)
@@ -142,6 +157,8 @@ def _result(run: Drive, clearance_m: float, cpu_s: float) -> RunResult:
         metres=round(report.distance_m, 2),
         drawn_ah=round(run.simulator.drawn_ah, 4),
         clearance_m=round(clearance_m, 3),
+        against_pilot=watch.against_pilot,
+        blind_s=round(watch.blind_s, 2),
         waits_for=_waits_for(run),
         steps=report.steps,
         searches=report.searches,

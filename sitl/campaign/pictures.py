@@ -18,8 +18,8 @@ from sitl.campaign.campaign_file import CampaignTable
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.summary import Runs, labels, varied
+from sitl.campaign.worded import GroundSpec
 from sitl.experiments import drawing
-from sitl.generators.kinds import is_kind
 from sitl.scenario import scenario_from_mission
 
 COLOURS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.RED, drawing.GREY, "#7b5ea7", "#56b4e9", "#444444")
@@ -81,7 +81,7 @@ def heat_maps(runs: Runs, folder: Path) -> list[tuple[str, Figure]]:
     """Of each world that is the same for every seed: the mission's name and its picture."""
     results: dict[str, list[RunResult]] = {}
     for spec, result in runs:
-        if not is_kind(spec.world) and result.outcome != ERROR:
+        if GroundSpec.of(spec.world) is None and result.outcome != ERROR:
             results.setdefault(spec.world, []).append(result)
     return [(world, _heat_map(folder / world, own)) for world, own in results.items()]
 

@@ -78,6 +78,10 @@ class RunResult:
     """Drawn from the battery."""
     clearance_m: float = 0.0
     """The least distance of its outline from anything while it moved, looked at twice a second; at most 5."""
+    against_pilot: int = 0
+    """Setpoints that were sent while a person or a failsafe had the rover."""
+    blind_s: float = 0.0
+    """So long it moved on without range data."""
     waits_for: str = ""
     """What it waited for at its end; empty if it waited for nothing."""
     steps: int = 0

@@ -23,11 +23,11 @@ from companion.mission.mission import MissionError
 from companion.planning.own_planners import OwnPlannerError, source_of
 from companion.planning.registry import PLANNERS
 from companion.storage.files import read_at_most
-from sitl.campaign.campaign_file import NOTHING, CampaignError
+from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
+from sitl.campaign.worded import GroundSpec, SensorSpec
 from sitl.experiments.experiment import code_digest
-from sitl.generators.kinds import is_kind
 
 MOST_BYTES = 2_000_000_000
 
@@ -102,11 +102,10 @@ class Digests:
 
 
 def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
-    if not is_kind(spec.world):
+    if GroundSpec.of(spec.world) is None:
         yield from load_mission(folder / spec.world).files
     source = None if spec.planner in PLANNERS else source_of(spec.planner)
-    named = (spec.faults if spec.faults != NOTHING else "", spec.sensors if spec.sensors.endswith(".toml") else "")
-    yield from (folder / name for name in named if name)
+    yield from (folder / name for name in (spec.faults, SensorSpec.of(spec.sensors).name) if name.endswith(".toml"))
     yield from () if source is None else (source,)
 
 

@@ -2,37 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, writable, written
-from companion.executive.warm_up import COMPILING, kernels_warm, warm_up
 from companion.mapping.map_files import MapError
 from companion.mission.mission import MissionError
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import Recorder
 from sitl.campaign.campaign_file import CampaignError, load_campaign
-from sitl.campaign.drive_run import check_spec, mission_of, prepared, settings_of
+from sitl.campaign.drive_run import mission_of, prepared, settings_of
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunSpec, specs_of
 from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
+from sitl.cli.runs import FILE, check_all, progress, warm_up_all
+from sitl.cli.search import search_campaign
+from sitl.generators.made_ground import NoWayError
 from sitl.scenario import ScenarioError
+from sitl.search.goals import Goal
 
-BAD_INPUT = (CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError)
+BAD_INPUT = (CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError, NoWayError)
 EXIT_FAILED = 3
-FILE = "runs.jsonl"
-LINES = 10
-"""Of progress, where there is no terminal for a bar."""
 
 
 def campaign(
@@ -50,6 +47,12 @@ def campaign(
         str | None, typer.Option(metavar="ID", help="Drive this single run again, with a record; ID as in the report.")
     ] = None,
     record: Annotated[Path | None, typer.Option(help="With --replay: the folder of the record.")] = None,
+    search: Annotated[
+        Goal | None, typer.Option(help="Look for runs that do this, instead of driving the lists (needs cma).")
+    ] = None,
+    budget: Annotated[
+        int, typer.Option(min=1, help="With --search: so many runs, and some more to make finds small.")
+    ] = 1000,
     parquet: Annotated[
         bool, typer.Option("--parquet", help=f"Write {PARQUET}, too (needs the extra parquet).")
     ] = False,
@@ -61,6 +64,8 @@ def campaign(
     try:
         if replay is not None or record is not None:
             _drive_again(file, replay, record)
+        elif search is not None:
+            search_campaign(file, search, budget, out, jobs)
         else:
             drive_campaign(file, out, jobs, cluster, parquet=parquet)
     except BAD_INPUT as error:
@@ -81,7 +86,7 @@ def drive_campaign(
     _say_what_there_is(store, specs)
     left = [spec for spec in specs if spec.id not in store.results]
     if left:
-        _check(left, folder)
+        check_all(left, folder)
         _drive(console, left, store, folder, jobs, cluster)
     runs = store.of(specs)
     put_out(console, table, runs, file, place, parquet=parquet)
@@ -111,57 +116,20 @@ def _drive(
 ) -> None:
     """All that is left. Ctrl-C ends it; what is done is kept."""
     if cluster is None:
-        _warm_up(left, folder)
+        warm_up_all(left, folder)
     before = len(store.results)
     done: Done = driven_here(left, folder, jobs) if cluster is None else driven_on(left, folder, cluster)
     try:
-        with _progress(console, len(left)) as advance:
+        with progress(console, len(left)) as advance:
             for spec, result in done:
                 with written(store.file):
                     store.add(spec, result)
-                advance()
+                advance(1)
     except KeyboardInterrupt:
         kept = len(store.results) - before
         raise StoppedError(
             f"{kept} of {len(left)} runs; they are kept in {store.file}, and the same command goes on"
         ) from None
-
-
-def _check(left: list[RunSpec], folder: Path) -> None:
-    """What could not be driven at all is told before hours of driving. Raises one of ``BAD_INPUT``."""
-    for spec in {(spec.world, spec.sensors, spec.faults): spec for spec in left}.values():
-        check_spec(spec, folder)
-
-
-def _warm_up(left: list[RunSpec], folder: Path) -> None:
-    """Once, before several processes would each compile for themselves."""
-    kinds = {(spec.planner, spec.controller, spec.settings, spec.world): spec for spec in left}
-    for spec in kinds.values():
-        settings, radius_m = settings_of(spec), mission_of(spec, folder).rover.turning_radius_m
-        if not kernels_warm(settings, radius_m):
-            typer.echo(COMPILING, err=True)
-            warm_up(settings, radius_m)
-
-
-@contextmanager
-def _progress(console: Console, total: int) -> Iterator[Callable[[], None]]:
-    columns = (
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-        TextColumn("left:"), TimeRemainingColumn(),
-    )  # fmt: skip
-    done = told = 0
-    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-        task = progress.add_task("runs", total=total)
-
-        def advance() -> None:
-            nonlocal done, told
-            done += 1
-            progress.update(task, completed=done)
-            if not console.is_terminal and LINES * done // total > told:
-                told = LINES * done // total
-                typer.echo(f"{done} of {total} runs", err=True)
-
-        yield advance
 
 
 def _drive_again(file: Path, run_id: str | None, record: Path | None) -> None:

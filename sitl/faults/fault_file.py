@@ -22,11 +22,11 @@ def load_faults(path: Path) -> FaultPlan:
     table = read_table(path, PlanTable, FaultFileError, "docs/faults.md describes the file")
     if not table.fault:
         raise FaultFileError(f"{path}: fault: there is none; write one [[fault]] table for each fault")
-    faults = tuple(_fault(path, number, one) for number, one in enumerate(table.fault, 1))
+    faults = tuple(fault_of(path, number, one) for number, one in enumerate(table.fault, 1))
     return FaultPlan(faults, table.seed, str(path))
 
 
-def _fault(path: Path, number: int, table: dict[str, Any]) -> Fault:
+def fault_of(path: Path | str, number: int, table: dict[str, Any]) -> Fault:
     """The fault of one ``[[fault]]`` table; ``number`` counts from 1."""
     kind = table.get("kind")
     model = KINDS.get(kind) if isinstance(kind, str) else None

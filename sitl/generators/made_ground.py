@@ -25,7 +25,7 @@ BODY_M = 0.6
 END_M = 4.0
 """Nothing stands within this of the two ends."""
 WAY_RESOLUTION_M = 0.2
-MOST_DRAWN = 200
+MOST_DRAWN = 60
 MOVER_STREAM = 52
 ROOM_M, WALL_M = 7.0, 1.0
 """Nothing moves within these of the west and the east edge, and of the others."""

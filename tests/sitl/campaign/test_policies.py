@@ -22,6 +22,8 @@ FINE = RunResult("points", "reached", 1, 1, seconds=31.25, bound_s=20.0, clearan
         ({"refused": 1}, (Policy.NOTHING_REFUSED,)),
         ({"unreachable": 1, "reached": 0, "outcome": "incomplete"}, (Policy.NO_FALSE_UNREACHABLE,)),
         ({"unreachable": 1, "reached": 0, "outcome": "incomplete", "bound_s": 0.0}, ()),
+        ({"against_pilot": 1}, (Policy.PILOT_WINS,)),
+        ({"blind_s": 0.05}, (Policy.NOT_BLIND,)),
         ({"outcome": "time limit"}, (Policy.ENDS,)),
         ({"outcome": "time limit", "waits_for": "a person who sets GUIDED"}, ()),
     ],

@@ -1,0 +1,192 @@
+"""What a search may move, each within bounds, and the run that values of these make.
+
+Nouns: gene.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any
+
+from annotated_types import Ge, Le
+
+from companion.settings import Settings
+from companion.settings.tunable_parameters import TABLE
+from sitl.campaign.campaign_file import CampaignTable
+from sitl.campaign.run_spec import RunSpec
+from sitl.campaign.worded import BETWEEN_FAULTS, NOTHING, GroundSpec, Worded
+from sitl.generators.kinds import KINDS
+
+Values = Mapping[str, float]
+"""By the names of genes; a gene without a value is as usual."""
+DIGITS = 3
+"""Values are rounded to so many, so that people can read what was found."""
+DECADE = 10.0
+"""Bounds farther apart than this factor are searched by their logarithm."""
+MOST_MOVERS = 6
+WORLD_FACTOR = 2.0
+"""So far a parameter of the ground may be from the usual."""
+
+
+class Part(StrEnum):
+    """What a gene belongs to."""
+
+    WORLD = "world"
+    TRAFFIC = "traffic"
+    ROVER = "rover"
+    SENSORS = "sensors"
+    FAULTS = "faults"
+    SETTINGS = "settings"
+
+
+@dataclass(frozen=True, slots=True)
+class Gene:
+    """One figure. ``usual``: what it is without a word."""
+
+    part: Part
+    name: str
+    low: float
+    high: float
+    usual: float
+    whole: bool = False
+
+    def value(self, share: float) -> float:
+        """Of a share from 0 (``low``) to 1 (``high``)."""
+        share = min(max(share, 0.0), 1.0)
+        if self._by_logarithm:
+            value = self.low * float((self.high / self.low) ** share)
+        else:
+            value = self.low + share * (self.high - self.low)
+        if self.whole:
+            return round(value)
+        return min(max(float(f"{value:.{DIGITS}g}"), self.low), self.high)
+
+    def share(self, value: float) -> float:
+        """The reverse of ``value``."""
+        value = min(max(value, self.low), self.high)
+        if self._by_logarithm:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+    @property
+    def _by_logarithm(self) -> bool:
+        return self.low > 0.0 and self.high > DECADE * self.low
+
+
+ROVER = (Gene(Part.ROVER, "off_model", 0.0, 0.3, 0.0), Gene(Part.ROVER, "late_s", 0.0, 0.2, 0.0))
+"""As far off its model and as late as the rover must bear (docs/guidance.md)."""
+SENSORS = (
+    Gene(Part.SENSORS, "noise_m", 0.0, 0.1, 0.02),
+    Gene(Part.SENSORS, "dropout", 0.0, 0.3, 0.0),
+    Gene(Part.SENSORS, "false_echo", 0.0, 0.005, 0.0),
+    Gene(Part.SENSORS, "latency_s", 0.0, 0.2, 0.0),
+    Gene(Part.SENSORS, "max_m", 3.0, 12.0, 8.0),
+)
+FAULTS: dict[str, dict[str, tuple[float, float]]] = {
+    "link_outage": {"start_s": (0.0, 60.0), "duration_s": (0.1, 3.0)},
+    "sensor_silent": {"start_s": (0.0, 60.0), "duration_s": (0.1, 3.0)},
+    "wheel_slip": {"start_s": (0.0, 60.0), "duration_s": (0.5, 10.0), "share": (0.05, 0.6)},
+    "gps_noise": {"start_s": (0.0, 60.0), "duration_s": (1.0, 30.0), "metres": (0.02, 0.25)},
+}
+"""Kinds of faults with the bounds of their keys; times count from when the rover begins to drive."""
+HARM = {"link_outage": "duration_s", "sensor_silent": "duration_s", "wheel_slip": "share", "gps_noise": "metres"}
+"""The key of a fault without which there is none."""
+
+
+def genes_of(campaign: CampaignTable, base: RunSpec) -> tuple[Gene, ...]:
+    """All that a search on this run may move: of the parts that the campaign's ``[search]`` names."""
+    groups = {
+        Part.WORLD: _of_ground(base.world),
+        Part.TRAFFIC: _of_traffic(base.world),
+        Part.ROVER: ROVER,
+        Part.SENSORS: SENSORS,
+        Part.FAULTS: _of_faults(),
+        Part.SETTINGS: _of_settings(campaign, base),
+    }
+    return tuple(gene for part in campaign.search.parts for gene in groups[Part(part)])
+
+
+def spec_with(base: RunSpec, genes: Sequence[Gene], values: Values) -> RunSpec:
+    """The run with these values of genes; those that have none are as in ``base``."""
+    of = {part: {gene.name: values[gene.name] for gene in genes if gene.part == part and gene.name in values}
+          for part in Part}  # fmt: skip
+    changes = json.loads(base.changes)
+    for name, value in of[Part.SETTINGS].items():
+        section, _, key = name.partition(".")
+        changes.setdefault(section, {})[key] = value
+    faults = _faults_in_words(base.faults, of[Part.FAULTS])
+    return replace(
+        base,
+        world=_more(base.world, {**of[Part.WORLD], **of[Part.TRAFFIC]}),
+        sensors=_more(base.sensors, of[Part.SENSORS]),
+        faults=faults,
+        off_model=of[Part.ROVER].get("off_model", base.off_model),
+        late_s=of[Part.ROVER].get("late_s", base.late_s),
+        changes=json.dumps(changes, sort_keys=True),
+        settings="found" if of[Part.SETTINGS] else base.settings,
+    )
+
+
+def _of_ground(world: str) -> tuple[Gene, ...]:
+    ground = GroundSpec.of(world)
+    if ground is None:
+        return ()
+    genes = []
+    for name, field in KINDS[ground.kind][0].model_fields.items():
+        low = next(float(one.ge) for one in field.metadata if isinstance(one, Ge))  # type: ignore[arg-type]
+        high = next(float(one.le) for one in field.metadata if isinstance(one, Le))  # type: ignore[arg-type]
+        usual = float(getattr(ground.given, name))
+        if usual > 0.0:  # far from the usual most grounds have no way
+            low, high = max(low, usual / WORLD_FACTOR), min(high, usual * WORLD_FACTOR)
+        genes.append(Gene(Part.WORLD, name, low, high, usual, whole=field.annotation is int))
+    return tuple(genes)
+
+
+def _of_traffic(world: str) -> tuple[Gene, ...]:
+    ground = GroundSpec.of(world)
+    return () if ground is None else (Gene(Part.TRAFFIC, "movers", 0, MOST_MOVERS, ground.movers, whole=True),)
+
+
+def _of_faults() -> tuple[Gene, ...]:
+    return tuple(
+        Gene(Part.FAULTS, f"{kind}.{key}", low, high, low)
+        for kind, keys in FAULTS.items()
+        for key, (low, high) in keys.items()
+    )
+
+
+def _of_settings(campaign: CampaignTable, base: RunSpec) -> tuple[Gene, ...]:
+    """Those that ground stations may change, within their bounds, and the campaign's own."""
+    settings, changes = Settings(), json.loads(base.changes)
+    bounds = {f"{one.section}.{one.key}": (one.low, one.high, one.whole) for one in TABLE}
+    for name, (low, high) in campaign.search.settings.items():
+        bounds[name] = (low, high, isinstance(_setting(settings, name), int))
+    genes = []
+    for name, (low, high, whole) in bounds.items():
+        section, _, key = name.partition(".")
+        usual = float(changes.get(section, {}).get(key, _setting(settings, name)))
+        genes.append(Gene(Part.SETTINGS, name, low, high, usual, whole))
+    return tuple(genes)
+
+
+def _setting(settings: Settings, name: str) -> Any:
+    section, _, key = name.partition(".")
+    return getattr(getattr(settings, section), key)
+
+
+def _more(text: str, values: Values) -> str:
+    name, there = Worded.of(text)
+    return str(Worded(name, {**there, **values}))
+
+
+def _faults_in_words(base: str, values: Values) -> str:
+    pieces = [] if base == NOTHING else [base]
+    for kind, keys in FAULTS.items():
+        if f"{kind}.{HARM[kind]}" in values:
+            given = {key: values.get(f"{kind}.{key}", bounds[0]) for key, bounds in keys.items()}
+            pieces.append(str(Worded(kind, {**given, "since": "driving"})))
+    return f"{BETWEEN_FAULTS} ".join(pieces) or NOTHING

@@ -1,0 +1,144 @@
+"""The search: generation after generation, the covariance matrix adaptation of ``cma`` moves the genes (ask and tell).
+
+It begins again and again: each start takes the campaign's next combination and seed, and ends when it has found what it
+looks for, or after ``GENERATIONS``. The same campaign and goal give the same search, whoever drives the runs.
+
+Nouns: find.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from companion.settings import SettingsError
+from sitl.campaign.campaign_file import CampaignError, CampaignTable
+from sitl.campaign.drive_run import NO_GROUND, settings_of
+from sitl.campaign.policies import ERROR, Policy, broken
+from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
+from sitl.campaign.worded import GroundSpec
+from sitl.search.genes import Gene, Values, genes_of, spec_with
+from sitl.search.goals import Goal, distance, shows
+
+GENERATIONS = 8
+SPREAD = 0.25
+"""Standard deviation of the first generation, in shares of the bounds."""
+IMPOSSIBLE = 1000.0
+"""The distance of values that no run can have."""
+STREAM = 83
+
+Driven = Callable[[Sequence[RunSpec]], list[RunResult]]
+"""Drives runs; the results come in the same order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Find:
+    """A run that has done something wrong. ``rule``: the goal of the search, or a policy that it broke besides."""
+
+    rule: Goal | Policy
+    base: RunSpec
+    genes: tuple[Gene, ...]
+    values: Values
+    result: RunResult
+
+    @property
+    def spec(self) -> RunSpec:
+        """The run."""
+        return spec_with(self.base, self.genes, self.values)
+
+    def again(self, result: RunResult) -> bool:
+        """Whether another run has done the same."""
+        return shows(self.rule, result) if isinstance(self.rule, Goal) else self.rule in broken(result)
+
+
+def searched(campaign: CampaignTable, goal: Goal, budget: int, drive: Driven) -> Iterator[tuple[list[Find], int]]:
+    """What each generation has found, and how many runs it was, until ``budget`` runs are driven.
+
+    Raises CampaignError if ``cma`` is not installed.
+    """
+    left = budget
+    for number, base in enumerate(_bases(campaign)):
+        for found, driven in _one_start(campaign, goal, base, number, drive):
+            left -= driven
+            yield found, driven
+            if left <= 0:
+                return
+
+
+def first_bases(campaign: CampaignTable) -> list[RunSpec]:
+    """Every combination, with the first seed."""
+    return list(specs_of(campaign.model_copy(update={"runs": 1})))
+
+
+def _bases(campaign: CampaignTable) -> Iterator[RunSpec]:
+    """Seed after seed, every combination, for ever."""
+    for seed in count(campaign.seed):
+        yield from specs_of(campaign.model_copy(update={"seed": seed, "runs": 1}))
+
+
+def _one_start(
+    campaign: CampaignTable, goal: Goal, base: RunSpec, number: int, drive: Driven
+) -> Iterator[tuple[list[Find], int]]:
+    """Finds and number of runs of each generation."""
+    genes = genes_of(campaign, base)
+    optimiser = _optimiser(genes, base, number)
+    for _ in range(GENERATIONS):
+        asked = optimiser.ask()
+        values = [_values(genes, shares) for shares in asked]
+        specs = [spec_with(base, genes, one) for one in values]
+        possible = [spec for spec in specs if _is_possible(spec)]
+        results = dict(zip((spec.id for spec in possible), drive(possible), strict=True))
+        told = [results.get(spec.id) for spec in specs]
+        optimiser.tell(asked, [_distance(goal, result) for result in told])
+        pairs = [(one, result) for one, result in zip(values, told, strict=True) if result is not None]
+        found = [find for one, result in pairs for find in _finds(goal, base, genes, one, result)]
+        yield found, max(len(possible), 1)
+        if any(find.rule == goal for find in found) or optimiser.stop():
+            return
+
+
+def _finds(goal: Goal, base: RunSpec, genes: tuple[Gene, ...], values: Values, result: RunResult) -> list[Find]:
+    """By what a run has done: the goal of the search, and all policies that it breaks."""
+    rules: list[Goal | Policy] = [goal] if shows(goal, result) else []
+    rules += [policy for policy in broken(result) if policy.value != goal.value and not _is_same(goal, policy)]
+    return [Find(rule, base, genes, values, result) for rule in rules]
+
+
+def _is_same(goal: Goal, policy: Policy) -> bool:
+    return (goal, policy) in ((Goal.COLLISION, Policy.NO_CONTACT), (Goal.STUCK, Policy.ENDS))
+
+
+def _distance(goal: Goal, result: RunResult | None) -> float:
+    return IMPOSSIBLE if result is None or result.outcome in (ERROR, NO_GROUND) else distance(goal, result)
+
+
+def _values(genes: tuple[Gene, ...], shares: Sequence[float]) -> Values:
+    """Those that are as usual are left out."""
+    given = {gene.name: gene.value(float(share)) for gene, share in zip(genes, shares, strict=True)}
+    return {gene.name: given[gene.name] for gene in genes if given[gene.name] != gene.usual}
+
+
+def _is_possible(spec: RunSpec) -> bool:
+    """Settings may contradict each other, and parameters of the ground."""
+    try:
+        settings_of(spec)
+        GroundSpec.of(spec.world)
+    except (SettingsError, ValueError):
+        return False
+    return True
+
+
+def _optimiser(genes: tuple[Gene, ...], base: RunSpec, number: int) -> Any:
+    try:
+        import cma
+    except ImportError as error:
+        raise CampaignError("--search: cma is not installed; install rover-companion[search]") from error
+    rng = np.random.default_rng((base.seed, number, STREAM))
+    usual = np.array([gene.share(gene.usual) for gene in genes])
+    begin = usual + rng.uniform(0.0, 0.5, len(genes)) * (rng.uniform(0.0, 1.0, len(genes)) - usual)
+    options = {"bounds": [0.0, 1.0], "seed": int(rng.integers(1, 2**31)), "verbose": -9, "verb_log": 0}
+    return cma.CMAEvolutionStrategy(begin, SPREAD, options)

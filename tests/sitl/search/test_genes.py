@@ -1,0 +1,68 @@
+"""What a search may move: bounds, rounding, and the run that values make."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.settings import Settings
+from companion.settings.tunable_parameters import TABLE
+from sitl.campaign.campaign_file import CampaignTable, SearchTable
+from sitl.campaign.drive_run import settings_of
+from sitl.campaign.run_spec import RunSpec, specs_of
+from sitl.campaign.worded import GroundSpec, SensorSpec, faults_of
+from sitl.search.genes import ROVER, SENSORS, Gene, Part, genes_of, spec_with
+
+CAMPAIGN = CampaignTable(
+    worlds=["cylinders movers=1"],
+    runs=1,
+    search=SearchTable(
+        parts=["world", "traffic", "rover", "sensors", "faults", "settings"],
+        settings={"guidance.look_ahead_m": (0.3, 2.0), "navigator.better_every_fields": (2, 9)},
+    ),
+)
+
+
+def base() -> RunSpec:
+    return next(specs_of(CAMPAIGN))
+
+
+@given(st.sampled_from([*ROVER, *SENSORS, *genes_of(CAMPAIGN, base())]), st.floats(-1.0, 2.0))
+def test_whatever_the_share_the_value_is_within_the_bounds(gene: Gene, share: float) -> None:
+    value = gene.value(share)
+    assert gene.low <= value <= gene.high
+    assert not gene.whole or value == round(value)
+    assert gene.value(gene.share(value)) == pytest.approx(value, rel=0.01, abs=0.5 if gene.whole else 1e-9)
+
+
+def test_every_tunable_setting_may_move_within_its_bounds_and_the_campaigns_own_too() -> None:
+    genes = {gene.name: gene for gene in genes_of(CAMPAIGN, base()) if gene.part == Part.SETTINGS}
+    assert {f"{one.section}.{one.key}" for one in TABLE} | {"guidance.look_ahead_m"} == set(genes)
+    assert (genes["guidance.look_ahead_m"].low, genes["guidance.look_ahead_m"].high) == (0.3, 2.0)
+    assert (genes["navigator.better_every_fields"].low, genes["navigator.better_every_fields"].whole) == (2, True)
+    assert genes["guidance.clearance_m"].usual == Settings().guidance.clearance_m
+
+
+def test_values_make_a_run_that_says_them_in_words() -> None:
+    genes = genes_of(CAMPAIGN, base())
+    values = {
+        "filled": 0.2, "movers": 3, "off_model": 0.25, "late_s": 0.1, "dropout": 0.05, "max_m": 5.0,
+        "wheel_slip.share": 0.3, "wheel_slip.start_s": 12.0, "guidance.clearance_m": 0.05,
+    }  # fmt: skip
+    spec = spec_with(base(), genes, values)
+    ground = GroundSpec.of(spec.world)
+    assert ground is not None and (ground.movers, ground.given.model_dump()["filled"]) == (3, 0.2)
+    assert SensorSpec.of(spec.sensors).changes.model_dump(exclude_none=True) == {"dropout": 0.05, "max_m": 5.0}
+    (slip,) = faults_of(spec.faults, None).faults  # type: ignore[arg-type]
+    assert (slip.start_s, slip.end_s, slip.since) == (12.0, 12.5, "driving")
+    assert (spec.off_model, spec.late_s) == (0.25, 0.1)
+    assert json.loads(spec.changes) == {"guidance": {"clearance_m": 0.05}}
+    assert settings_of(spec).guidance.clearance_m == 0.05
+    assert spec_with(base(), genes, {}) == base(), "as usual: the same run"
+
+
+def test_a_fault_without_what_makes_it_one_is_none() -> None:
+    assert spec_with(base(), genes_of(CAMPAIGN, base()), {"wheel_slip.start_s": 12.0}).faults == "none"

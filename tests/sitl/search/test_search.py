@@ -1,0 +1,117 @@
+"""The search on made-up landscapes: it finds what is there, the same each time, and leaves what is not needed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from sitl.campaign.campaign_file import CampaignTable, SearchTable, load_campaign
+from sitl.campaign.policies import Policy
+from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
+from sitl.campaign.worded import SensorSpec
+from sitl.search.found_file import differences, write_find
+from sitl.search.goals import Goal, distance, shows
+from sitl.search.minimise import minimised
+from sitl.search.search import Find, first_bases, searched
+
+CAMPAIGN = CampaignTable(
+    worlds=["cylinders", "yard"],
+    guard=[True],
+    time_limit_s=100.0,
+    search=SearchTable(parts=["rover", "sensors", "settings"]),
+)
+
+
+def clearance_of(spec: RunSpec) -> float:
+    """Little where a setting is small and a sensor misses much."""
+    clearance_m = json.loads(spec.changes).get("guidance", {}).get("clearance_m", 0.15)
+    return max(0.0, 0.3 + 2.0 * clearance_m - 1.5 * (SensorSpec.of(spec.sensors).changes.dropout or 0.0))
+
+
+def made_up(specs: Sequence[RunSpec]) -> list[RunResult]:
+    return [
+        RunResult("points", "reached", 1, 1, touched=clear_m < 0.05, seconds=50.0, bound_s=30.0, clearance_m=clear_m)
+        for clear_m in map(clearance_of, specs)
+    ]
+
+
+def finds_of(budget: int) -> tuple[list[Find], int]:
+    finds, driven = [], 0
+    for found, number in searched(CAMPAIGN, Goal.COLLISION, budget, made_up):
+        finds += found
+        driven += number
+    return finds, driven
+
+
+@pytest.fixture(scope="module")
+def finds() -> list[Find]:
+    return finds_of(400)[0]
+
+
+def test_it_finds_what_one_of_a_hundred_random_runs_shows(finds: list[Find]) -> None:
+    """A start has some 110 runs at most, and ends with the generation that has found something."""
+    assert all(find.rule == Goal.COLLISION and clearance_of(find.spec) < 0.05 for find in finds)
+    assert len({(find.base.seed, find.base.world) for find in finds}) >= 3, "starts that have found something"
+
+
+def test_the_same_campaign_gives_the_same_search(finds: list[Find]) -> None:
+    again, driven = finds_of(150)
+    assert 150 <= driven < 170 and len(again) > 1
+    assert [(find.spec, find.values) for find in again] == [(find.spec, find.values) for find in finds[: len(again)]]
+
+
+def test_a_find_is_made_as_small_as_it_can_be(finds: list[Find]) -> None:
+    find = finds[0]
+    least = minimised(find, made_up)
+    assert 1 <= len(least.values) < len(find.values)
+    assert set(least.values) <= {"dropout", "guidance.clearance_m"}
+    assert clearance_of(least.spec) < 0.05 and least.again(least.result)
+
+
+def test_a_find_is_written_as_a_campaign_of_one_run_the_same(finds: list[Find], tmp_path: Path) -> None:
+    least = minimised(finds[0], made_up)
+    file = tmp_path / "found" / "one.toml"
+    write_find(least, file, tmp_path / "c.toml", "rover-sitl campaign c.toml --search collision")
+    (spec,) = specs_of(load_campaign(file))
+    assert spec == least.spec and spec.id == least.spec.id
+    assert "dropout=" in differences(least)
+
+
+def test_files_of_a_find_count_from_its_own_folder(tmp_path: Path) -> None:
+    (tmp_path / "yard.toml").write_text("[[target]]\nnorth_m = 1.0\neast_m = 2.0\n")
+    table = CampaignTable(worlds=["yard.toml"])
+    base = first_bases(table)[0]
+    find = Find(Goal.STUCK, base, (), {}, made_up([base])[0])
+    write_find(find, tmp_path / "a" / "b" / "one.toml", tmp_path / "c.toml", "...")
+    assert load_campaign(tmp_path / "a" / "b" / "one.toml").worlds == ["../../yard.toml"]
+
+
+@pytest.mark.parametrize(
+    ("goal", "result", "is_shown"),
+    [
+        (Goal.COLLISION, RunResult("points", "collision", touched=1), True),
+        (Goal.COLLISION, RunResult("points", "reached", clearance_m=0.01), False),
+        (Goal.CLEARANCE, RunResult("points", "reached", clearance_m=0.01), True),
+        (Goal.STUCK, RunResult("points", "time limit", targets=1, bound_s=20.0), True),
+        (Goal.STUCK, RunResult("points", "time limit", targets=1, bound_s=20.0, waits_for="a person"), False),
+        (Goal.STUCK, RunResult("points", "time limit", targets=1, bound_s=0.0), False),
+        (Goal.UNREACHABLE, RunResult("points", "unreachable", unreachable=1, bound_s=20.0), True),
+        (Goal.UNREACHABLE, RunResult("points", "unreachable", unreachable=1), False),
+        (Goal.REFUSED, RunResult("points", "reached", refused=1), True),
+    ],
+)
+def test_what_a_goal_looks_for(goal: Goal, result: RunResult, is_shown: bool) -> None:
+    assert shows(goal, result) == is_shown
+    usual = RunResult("points", "reached", 1, 1, seconds=40.0, bound_s=20.0, clearance_m=1.0)
+    assert not shows(goal, usual) and (not is_shown or distance(goal, result) < distance(goal, usual))
+
+
+def test_rules_that_are_broken_besides_are_finds_too() -> None:
+    def failing(specs: Sequence[RunSpec]) -> list[RunResult]:
+        return [RunResult("points", "reached", 1, 1, refused=1, seconds=9.0, clearance_m=1.0) for _ in specs]
+
+    found, _ = next(searched(CAMPAIGN, Goal.COLLISION, 10, failing))
+    assert {find.rule for find in found} == {Policy.NOTHING_REFUSED}
