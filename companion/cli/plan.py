@@ -29,6 +29,7 @@ from companion.settings.versions import made_with
 
 EFFORT = {
     "sedighi": ("generations", "chromosomes"),
+    "sedighi-local": ("generations", "chromosomes"),
     "hermanu": ("generations", "chromosomes"),
     "geisler": ("generations", "chromosomes"),
     "vertex": ("generations", "chromosomes"),

@@ -20,6 +20,7 @@ from companion.planning.own_planners import OwnPlannerError, own_factory, regist
 from companion.planning.papers.achour_ga import AchourGa
 from companion.planning.papers.prm import Prm
 from companion.planning.papers.sedighi_ga import geisler, hermanu, sedighi
+from companion.planning.papers.sedighi_local import SedighiLocal
 from companion.planning.papers.wang_ga import vertex, vertex_plus
 from companion.planning.planner import Planner, PlannerFactory
 from companion.planning.problem import Budget, PlanningProblem
@@ -35,6 +36,7 @@ PLANNERS: dict[str, PlannerFactory] = {
     "theta-star": ThetaStar,
     "dstar-lite": DstarLite,
     "sedighi": sedighi,
+    "sedighi-local": SedighiLocal,
     "geisler": geisler,
     "hermanu": hermanu,
     "vertex": vertex,

@@ -52,7 +52,10 @@ class VertexSettings(Section):
     length_weight: float = Field(0.0, ge=0.0, description="w_d of equation 1: cost of a field of path")
     time_weight: float = Field(1.0, ge=0.0, description="w_t of equation 1: cost of a second")
     speed_levels: int = Field(
-        5, ge=1, le=100, description="number of speeds, evenly spaced from the slowest to the fastest (II.B)"
+        5,
+        ge=1,
+        le=100,
+        description="number of speeds, evenly spaced from the slowest to the fastest (II.B); 1: the fastest only",
     )
     safe_fields: float = Field(
         0.5,

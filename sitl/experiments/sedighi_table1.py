@@ -24,6 +24,7 @@ from sitl.experiments.sedighi_spaces import DRAWINGS, given_spaces, own_spaces
 NAME = "sedighi-table1"
 METHODS = ("geisler", "hermanu", "sedighi")
 PAPER_RUNS = 15
+MOST_SWITCHES = 2
 PAPER_PERCENT = {
     "SPSet01": ("100", "93.3", "93.3"),
     "SPSet02": ("0.00", "86.7", "100"),
@@ -226,6 +227,19 @@ The same for grids given with `--maps FOLDER` (text files: the number of rows, t
 {markdown_table(HEAD, report._success(names))}
 
 {markdown_table(TIME_HEAD, report._times(names))}
+{_never_found(report, names)}"""
+
+
+def _never_found(report: TableReport, names: dict[str, PlanningProblem]) -> str:
+    """The grids that `sedighi` could cross with its switches, and never does."""
+    within = [name for name, problem in names.items() if fewest_switches(problem) in range(MOST_SWITCHES + 1)]
+    never = [name for name in within if not report.of(name)[-1].paths()]
+    if not never:
+        return ""
+    return f"""
+`sedighi` could write down a way over {", ".join(never)} with its {MOST_SWITCHES} switches, and never found one: the two
+places must fit at once, and half a way to them is worth nothing. A search in smaller squares (`sedighi-local`,
+[planners.md](planners.md)) is what the paper means the method for.
 """
 
 

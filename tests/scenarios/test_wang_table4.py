@@ -2,6 +2,7 @@
 
 import json
 
+import pytest
 from typer.testing import CliRunner
 
 from sitl.cli.commands import app
@@ -40,5 +41,15 @@ def test_wang_table4(tmp_path):
     for fast, short in zip(by_time, by_length, strict=True):
         assert fast["offline_time_s"] <= short["offline_time_s"]
         assert fast["top_speed_share"] >= 0.75 > short["top_speed_share"]
+    variants = {(one["variant"], one["environment"]): one for one in figures["variants"]}
+    assert len(variants) == 4 * 4 and all(one["found"] == RUNS for one in variants.values())
+    for number in (1, 2, 3, 4):
+        usual, fastest = variants["as above", number], variants["fastest speed only", number]
+        assert usual["offline_time_s"] == by_time[number - 1]["offline_time_s"], "the same seeds"
+        assert fastest["offline_length_m"] / fastest["offline_time_s"] == pytest.approx(0.7), (
+            "the fastest, not the slowest"
+        )
+        bare = variants["no straight line", number]
+        assert bare["first_generations"] > 0 and bare["offline_length_m"] >= usual["offline_length_m"] - 30.0
     assert (docs / "images" / "wang-table4.png").stat().st_size > 10_000
     assert "Wang, Sillitoe & Mulvaney 2007" in (docs / "results.md").read_text(encoding="utf-8")

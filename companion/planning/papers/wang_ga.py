@@ -64,7 +64,8 @@ def planned(
     pool = np.unique(np.concatenate((corner_fields, around[polygons.owner.ravel()[around] == 0])))
     pool = pool[(pool >= 0) & (pool != start) & (pool != target)]
     low, high = problem.kinematics.speeds_fields_s
-    speeds = np.linspace(low, high, settings.speed_levels) if timed and high > low else np.array([high])
+    levels = settings.speed_levels if timed and high > low else 1
+    speeds = np.linspace(low, high, levels) if levels > 1 else np.array([high])
     weights = {} if timed else {"length_weight": 1.0, "time_weight": 0.0}
     task = Task(
         _ground(polygons, corner_fields, len(pool), problem.corner_cutting),
@@ -75,9 +76,9 @@ def planned(
         start,
         target,
     )
-    fields, levels, value, first, generations, evaluations = search(task, seed)
+    fields, chosen, value, first, generations, evaluations = search(task, seed)
     corners = np.column_stack((fields % width, fields // width))
-    return Plan(corners, speeds[levels[:-1]], value, first, generations, evaluations)
+    return Plan(corners, speeds[chosen[:-1]], value, first, generations, evaluations)
 
 
 def _polygons_for(problem: PlanningProblem, settings: VertexSettings) -> Polygons:
