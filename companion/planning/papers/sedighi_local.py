@@ -6,7 +6,7 @@ the first one behind the obstacle. Then it goes straight on to the target. The p
 is: here it holds the obstacle with a field of free ground round it. Where it holds no way, it is grown to twice its
 side, up to the whole map (ours).
 
-Nouns: local Sedighi.
+Nouns: Sedighi local.
 """
 
 from __future__ import annotations
