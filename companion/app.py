@@ -23,7 +23,7 @@ from companion.mapping.evidence_map import EvidenceMap
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.mission import Mission
 from companion.navigation.step_runner import StepRunner
-from companion.operator.notifications import Outcome, Status, status_of
+from companion.operator.notifications import News, Outcome, Status, status_of
 from companion.recording.recorder import RunLog
 from companion.settings import Settings
 from companion.supervision.assembly import Options, assemble
@@ -132,6 +132,11 @@ class Companion:
         """How the rover follows velocities; None where motions are not planned, or before the mission has begun."""
         executor = self.mission_run.executor
         return executor.estimator.estimate if executor is not None and executor.learns else None
+
+    @property
+    def news(self) -> tuple[News, ...]:
+        """What was said in this tick, by the autopilot as well."""
+        return tuple(self._notifier.news)
 
     def status(self) -> Status:
         """A picture of this moment."""

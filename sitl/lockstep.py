@@ -249,7 +249,7 @@ class Drive:
         next_track_s = next_look_s = 0.0
         while not self.companion.done and self.simulator.time_s < self.time_limit_s:
             self.companion.tick()
-            self._news += self.companion.status().news
+            self._news += self.companion.news
             if self.simulator.time_s >= next_track_s:
                 next_track_s += TRACK_PERIOD_S
                 self._note_track()

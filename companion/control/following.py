@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
+from companion.core.changed import changed
 from companion.core.rover_limits import RoverLimits
 from companion.settings import MotionSettings
 from companion.vehicle.motion_limits import ACCELERATION, CRUISE, DECELERATION, FASTEST, TURN_ACCELERATION, TURN_RATE
@@ -77,7 +77,7 @@ def within_limits(rover: RoverLimits, parameters: Mapping[str, float]) -> RoverL
     """
     fastest_m_s = parameters.get(FASTEST, 0.0) or parameters.get(CRUISE, 0.0)
     turns_deg_s = parameters.get(TURN_RATE, 0.0)
-    return replace(
+    return changed(
         rover,
         told_most_m_s=fastest_m_s if fastest_m_s > 0.0 else math.inf,
         turns_most_rad_s=math.radians(turns_deg_s) if turns_deg_s > 0.0 else math.inf,

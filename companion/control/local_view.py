@@ -6,10 +6,11 @@ Nouns: local view.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from companion.control.following import AS_SHIPPED, Following
 from companion.control.told import Told
+from companion.core.changed import changed
 from companion.core.footprint import Footprint
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
@@ -21,7 +22,7 @@ MOST_FURTHER_M = 3.0
 """No rover shoots farther: its throttle closes meanwhile."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class LocalView:
     """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive.
 
@@ -68,4 +69,4 @@ class LocalView:
 
     def with_speeds(self, cruise_speed_m_s: float, fastest_m_s: float) -> LocalView:
         """The same moment with another cruise speed, and with the highest speed that is ever told on this way."""
-        return replace(self, rover=replace(self.rover, cruise_speed_m_s=cruise_speed_m_s, fastest_m_s=fastest_m_s))
+        return changed(self, rover=changed(self.rover, cruise_speed_m_s=cruise_speed_m_s, fastest_m_s=fastest_m_s))

@@ -53,9 +53,9 @@ BRAKE_TURNS = (0.0, -0.5, 0.5, -1.0, 1.0)
 ENOUGH_M = 0.1
 """With so much room it does not turn while it brakes."""
 STANDS_M_S = 0.05
-TURNS = 17
-"""Turn rates for which the fastest speed is looked for that may be told."""
-NONE_ADMITTED = np.zeros((TURNS, 2))
+TURN_SHARES = np.linspace(-1.0, 1.0, 17)
+"""Turn rates for which the fastest speed is looked for that may be told, as shares of the fastest."""
+NONE_ADMITTED = np.zeros((len(TURN_SHARES), 2))
 FASTER_S, BLUR_S, MOST_BLUR_RAD = 0.05, 1.15, math.radians(10.0)
 """Left alone, the rover keeps so much more room for each m/s; more where a reading speaks for a wide angle: how far to
 the side something ends that is as far away as the rover needs to stop is known only to within half of that."""
@@ -217,7 +217,7 @@ def _is_seen(view: LocalView, point: NedPoint) -> bool:
 
 def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
     """See ``MotionProblem.admitted_m_s``: the rover may be left alone with these."""
-    turns_rad_s = np.linspace(-1.0, 1.0, TURNS) * worst.model.turn_fastest_rad_s
+    turns_rad_s = TURN_SHARES * worst.model.turn_fastest_rad_s
     lasts_s = view.settings.guidance.velocity_lasts_s
     gains = turn_gains(view.following, lasts_s)
     admitted: NDArray[np.float64] = admitted_speeds(

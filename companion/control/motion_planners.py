@@ -27,6 +27,9 @@ Motions = NDArray[np.float64]
 """Shape (m, n, 2): m motions of n knots, each a speed (m/s) and a turn rate (rad/s)."""
 
 KNOTS = 6
+SPEED_SHARES = np.array([0.125, 0.25, 0.5, 0.75, 1.0])
+TURN_SHARES = np.linspace(-1.0, 1.0, 9)
+"""Of the fastest: the motions of one command that are always tried."""
 
 
 class MotionKind(StrEnum):
@@ -162,7 +165,9 @@ def motion_planner(kind: MotionKind, seed: int = 0) -> MotionPlanner:
 
 def constant_motions(model: RoverModel) -> Motions:
     """Motions of one command each, over all that the rover can do; standing and turning on the spot among them."""
-    speeds = (-model.backwards_m_s, 0.0, *(model.fastest_m_s * np.array([0.125, 0.25, 0.5, 0.75, 1.0])))
-    turns = np.linspace(-1.0, 1.0, 9) * model.turn_fastest_rad_s
-    grid = np.array([(speed, turn) for speed in speeds for turn in turns])
-    return np.repeat(grid[:, None, :], KNOTS, axis=1)
+    speeds = np.concatenate(((-model.backwards_m_s, 0.0), model.fastest_m_s * SPEED_SHARES))
+    turns = model.turn_fastest_rad_s * TURN_SHARES
+    motions = np.empty((len(speeds), len(turns), KNOTS, 2))
+    motions[..., 0] = speeds[:, None, None]
+    motions[..., 1] = turns[:, None]
+    return motions.reshape(-1, KNOTS, 2)

@@ -136,7 +136,7 @@ def advanced(path: ReferencePath, pose: Pose, window_m: float = 4.0) -> Referenc
     """The path with its progress moved to the point nearest to the rover, never back and at most the window ahead."""
     stop = min(len(path.points), path.progress + int(window_m / STEP_M) + 1)
     ahead = path.points[path.progress : stop]
-    nearest = int(np.argmin((ahead[:, 0] - pose.north_m) ** 2 + (ahead[:, 1] - pose.east_m) ** 2))
+    nearest = int(((ahead[:, 0] - pose.north_m) ** 2 + (ahead[:, 1] - pose.east_m) ** 2).argmin())
     return ReferencePath(path.points, path.progress + nearest, path.speeds_m_s)
 
 

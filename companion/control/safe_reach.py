@@ -84,36 +84,36 @@ class _Search:
         if found < 0:
             return Reach(here, 0.0, room_m)
         index = self._last - 2 * found
-        target = self._path.point(index)
         further = [self._path.point(i) for i in (index + 1, index + 2) if i <= self._last]
-        return self._moved_on(Reach(target, here.distance_m(target), room_m), further, stopping)
+        target = self._moved_on(self._path.point(index), further, stopping)
+        return Reach(target, here.distance_m(target), room_m)
 
-    def _moved_on(self, reach: Reach, further: list[NedPoint], stopping: Stopping) -> Reach:
+    def _moved_on(self, target: NedPoint, further: list[NedPoint], stopping: Stopping) -> NedPoint:
         """The target moved on towards the next points of the path, which are too far, in steps of ``ROLLED_M``.
 
         The farther the target, the faster the autopilot drives, so no decimetre is given away.
         """
-        steps = self._nearer(reach, further)
+        steps = self._steps(target, further)
         if not steps:
-            return reach
-        places = np.array([(step.target.north_m, step.target.east_m) for step in steps])
+            return target
+        places = np.array([(step.north_m, step.east_m) for step in steps])
         may = stops_in_a_row(self._ground, self._start, self._view.evidence.frame.xys(places), stopping)
-        return steps[may - 1] if may else reach
+        return steps[may - 1] if may else target
 
-    def _nearer(self, reach: Reach, further: list[NedPoint]) -> list[Reach]:
+    def _steps(self, target: NedPoint, further: list[NedPoint]) -> list[NedPoint]:
         """The places in steps of ``ROLLED_M`` towards these points, as long as each is farther than the last one."""
         here = self._view.pose.point
-        steps: list[Reach] = []
+        distance_m = here.distance_m(target)
+        steps: list[NedPoint] = []
         for point in further:
-            bearing, left_m = reach.target.bearing_rad(point), reach.target.distance_m(point)
+            bearing, left_m = target.bearing_rad(point), target.distance_m(point)
             pieces = max(1, math.ceil(left_m / ROLLED_M - 1e-6))
             for _ in range(pieces):
-                target = reach.target.moved(bearing, left_m / pieces)
-                nearer = Reach(target, here.distance_m(target), reach.room_m)
-                if not reach.distance_m < nearer.distance_m <= self._limit_m:
+                target = target.moved(bearing, left_m / pieces)
+                before_m, distance_m = distance_m, here.distance_m(target)
+                if not before_m < distance_m <= self._limit_m:
                     return steps
-                steps.append(nearer)
-                reach = nearer
+                steps.append(target)
         return steps
 
     def _stopping(self, room_m: float) -> Stopping:

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RoverLimits:
     """The rover as the controllers see it."""
 

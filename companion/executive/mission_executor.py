@@ -23,7 +23,7 @@ from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity, TextSink
-from companion.executive.command_progress import START, CommandResult, names
+from companion.executive.command_progress import START, CommandProgress, CommandResult, names
 from companion.executive.command_progress import carried as carried_commands
 from companion.executive.command_sender import CommandSender, place_name
 from companion.executive.controller_choice import settings_in_force
@@ -353,19 +353,21 @@ class MissionExecutor:
             self._commands_place,
             away=head is not None and head.is_left_by(pose.point, near_m),
         )
-        self.progress = replace(self.progress, commands=commands)
+        self._set_commands(commands)
         return command
 
     def answered(self, ack: AckSeen) -> None:
         """An answer of the autopilot to any command."""
-        commands = self.command_sender.answered(self.progress.commands, ack, self._commands_place)
-        if commands is not self.progress.commands:
-            self.progress = replace(self.progress, commands=commands)
+        self._set_commands(self.command_sender.answered(self.progress.commands, ack, self._commands_place))
 
     def resume_commands(self) -> None:
         """Take up the commands that an earlier run has left open."""
-        commands = self.command_sender.resume(self.progress.commands, self._commands_place)
-        self.progress = replace(self.progress, commands=commands)
+        self._set_commands(self.command_sender.resume(self.progress.commands, self._commands_place))
+
+    def _set_commands(self, commands: CommandProgress) -> None:
+        """How far the commands are: mostly as before."""
+        if commands is not self.progress.commands:
+            self.progress = replace(self.progress, commands=commands)
 
     @property
     def _commands_place(self) -> str:

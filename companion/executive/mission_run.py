@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum, auto
 
 import numpy as np
@@ -16,6 +16,7 @@ from companion.control.controller import STANDSTILL, ControlCommand
 from companion.control.drag import DragWatch
 from companion.control.setpoint_check import SetpointCheck
 from companion.control.told import Told, after
+from companion.core.changed import changed
 from companion.core.frames import Pose
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity, TextSink
@@ -200,7 +201,7 @@ class MissionRun:
         told = None if self._told is None else self._told.setpoint
         full_m_s = full_throttle_m_s(self.vehicle.parameters)
         held_m_s = self._drag.held_m_s(self.vehicle.throttle, full_m_s, view)
-        view = replace(view, held_m_s=held_m_s, told=told, lately=self._lately, placed_s=self._placed_s)
+        view = changed(view, held_m_s=held_m_s, told=told, lately=self._lately, placed_s=self._placed_s)
         executor.learn(view)
         wanted = executor.guide(task, view)
         wanted = self.legs.guide(wanted, executor, view)

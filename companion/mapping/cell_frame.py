@@ -34,7 +34,10 @@ class CellFrame:
     def xys(self, points: Points) -> Points:
         """Places in cells: shape (n, 2), columns x and y, from columns north and east in metres."""
         scale, corner = 1.0 / self.cell_m, self.south_west
-        return np.column_stack(((points[:, 1] - corner.east_m) * scale, (points[:, 0] - corner.north_m) * scale))
+        xys = np.empty(points.shape)
+        xys[:, 0] = (points[:, 1] - corner.east_m) * scale
+        xys[:, 1] = (points[:, 0] - corner.north_m) * scale
+        return xys
 
     def point(self, x: float, y: float) -> NedPoint:
         """A place in metres."""

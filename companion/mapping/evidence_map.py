@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -126,7 +126,7 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
         evidence.agreement.others(scan),
         (x, y, frame.cells(evidence.rover_radius_m)),
     )
-    evidence.agreement.note(scan, _hit_cells(evidence, pose, scan))
+    evidence.agreement.note(scan, partial(_hit_cells, evidence, pose, scan))
     left, low, right, high = (int(cell) // evidence.subdivisions for cell in turned)
     if left <= right:
         # Weights follow from which cells are obstacles: most scans change that of few.

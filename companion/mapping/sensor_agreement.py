@@ -6,6 +6,8 @@ Nouns: sensor agreement.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,23 +22,35 @@ Cells = NDArray[np.int64]
 """Evidence cells, shape (n, 2): x and y."""
 
 
+class _Hits:
+    """Those of one scan. Most rovers have one sensor, and none of their cells is ever asked for."""
+
+    def __init__(self, scan: RangeScan, find: Callable[[], Cells]) -> None:
+        self.time_s, self.voice = scan.time_s, scan.voice
+        self._find = find
+
+    @cached_property
+    def cells(self) -> Cells:
+        """Where they are."""
+        return self._find()
+
+
 class SensorAgreement:
     """The hits of the newest second, by the sensor that saw them."""
 
     def __init__(self) -> None:
-        self._seen: deque[tuple[float, tuple[int, str], Cells]] = deque()
+        self._seen: deque[_Hits] = deque()
 
-    def note(self, scan: RangeScan, cells: Cells) -> None:
-        """The readings of a scan have ended in these cells."""
-        if len(cells):
-            self._seen.append((scan.time_s, scan.voice, cells))
+    def note(self, scan: RangeScan, find: Callable[[], Cells]) -> None:
+        """One more scan. ``find`` tells in which cells its readings have ended, also later."""
+        self._seen.append(_Hits(scan, find))
 
     def others(self, scan: RangeScan) -> Cells:
         """The cells in which other sensors than the one of this scan have just seen something."""
-        while self._seen and self._seen[0][0] < scan.time_s - BELIEVED_S:
+        while self._seen and self._seen[0].time_s < scan.time_s - BELIEVED_S:
             self._seen.popleft()
         own = scan.voice
-        cells = [cells for _, voice, cells in self._seen if voice != own]
+        cells = [hits.cells for hits in self._seen if hits.voice != own]
         return np.concatenate(cells) if cells else NONE
 
     def clear(self) -> None:

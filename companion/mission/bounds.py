@@ -76,6 +76,8 @@ class Bounds:
 
     def outside(self, point: NedPoint) -> str:
         """The name of the border that the rover's middle has crossed; empty if none."""
+        if not self._bounds:
+            return ""
         place = shapely.Point(point.east_m, point.north_m)
         return next((bound.name for bound in self._near(place) if bound.depth_m(place) <= 0.0), "")
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from companion.core.grid import Cell, Grid
 from companion.planning.problem import Path, PlanResult, PlanStatus
-from companion.planning.raster import CellArray, cells_cost, plain
+from companion.planning.raster import CellArray, cells_cost, first_fault, plain
 
 BACKTRACK_TRIES = 8
 NEVER = 2**62
@@ -155,9 +155,9 @@ def is_clear(grid: Grid, cells: CellArray | tuple[Cell, ...], driven: Steps = fr
 
     Steps in ``driven`` are clear.
     """
-    if len(cells) < 2:
+    if len(cells) < 2 or first_fault(plain(grid.weights), np.asarray(cells), False)[0] == 0:
         return True
-    barred = _barred(grid, cells)
+    barred = _barred(grid, cells)  # which steps they are, and the field where the rover is may be an obstacle
     return not barred.any() or driven.issuperset(_steps(cells, barred))
 
 

@@ -142,7 +142,9 @@ class ObjectTracker:
             return
         ends, range_m = _ends(pose, scan)
         free = self._on_free_ground(ends, ROUND_M + 0.5 * scan.beam_width_rad * range_m)
-        things = _seen_things(ends, free, _alone(scan), pose, scan.beam_width_rad)
+        things: list[Sighting] = []
+        if free.any() or scan.beam_width_rad <= FINE_RAD:  # without either nothing of it may move
+            things = _seen_things(ends, free, _alone(scan), pose, scan.beam_width_rad)
         if things or self._tracks:
             self._follow(pose.time_s, things)
 

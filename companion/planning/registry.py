@@ -24,7 +24,7 @@ from companion.planning.papers.sedighi_local import SedighiLocal
 from companion.planning.papers.wang_ga import vertex, vertex_plus
 from companion.planning.planner import Planner, PlannerFactory
 from companion.planning.problem import Budget, PlanningProblem
-from companion.planning.raster import cells_cost
+from companion.planning.raster import cells_cost, first_fault
 from companion.settings import PlannerSettings
 from companion.storage.validation import alike
 
@@ -91,7 +91,8 @@ def warm_up(names: Iterable[str] = tuple(PLANNERS), settings: PlannerSettings | 
         for problem in (_easy(), _winding()):
             path = planner.plan(problem, Budget(), rng).path
             if path is not None:
-                cells_cost(problem.weights, path.cell_array)  # the navigator calls it for the rest of a path
+                cells_cost(problem.weights, path.cell_array)  # the navigator calls them for the rest of a path
+                first_fault(problem.weights, path.cell_array, False)
 
 
 def _easy() -> PlanningProblem:

@@ -49,10 +49,8 @@ def with_battery(state: BatteryState, seen: BatterySeen) -> BatteryState:
 
 def judged(state: BatteryState, now_s: float, settings: PowerSettings) -> BatteryState:
     """The state at this moment: a level is reached when a reading has asked for it for ``after_s`` without a break."""
-    reasons = {
-        level: _reason(level, _known(state.batteries, now_s), settings)
-        for level in (BatteryLevel.RETURN, BatteryLevel.HOLD)
-    }
+    known = _known(state.batteries, now_s)
+    reasons = {level: _reason(level, known, settings) for level in (BatteryLevel.RETURN, BatteryLevel.HOLD)}
     since_s = {level: state.since_s.get(level, now_s) for level, reason in reasons.items() if reason is not None}
     if since_s != state.since_s:
         state = replace(state, since_s=since_s)

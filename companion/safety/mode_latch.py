@@ -81,17 +81,17 @@ def check(
         if heartbeat.armed and heartbeat.time_s >= latch.hold_s + HOLD_AGAIN_S:
             return replace(latch, hold_s=now_s), Verdict(Reaction.HOLD, Reason(LatchReason.HOLD_LOST))
         return latch, Verdict(Reaction.SILENT, Reason(LatchReason.HOLD_SENT))
-    latch = replace(latch, control=control)
+    safe = replace(latch, control=control, unsafe_since_s=None)
     if not heartbeat.armed:
-        return replace(latch, unsafe_since_s=None), Verdict(Reaction.SILENT, Reason(LatchReason.DISARMED))
+        return safe, Verdict(Reaction.SILENT, Reason(LatchReason.DISARMED))
     if doubt is None:
-        return replace(latch, unsafe_since_s=None), Verdict(Reaction.DRIVE)
+        return safe, Verdict(Reaction.DRIVE)
     if doubt.kind in WAITED_OUT:
-        return replace(latch, unsafe_since_s=None), Verdict(Reaction.STOP, doubt)
+        return safe, Verdict(Reaction.STOP, doubt)
     since_s = now_s if latch.unsafe_since_s is None else latch.unsafe_since_s
     if doubt.kind is Doubt.STICKS_MOVED or now_s - since_s >= settings.hold_after_s:
         return LatchState(Control.PERSON, hold_sent=True, hold_s=now_s), Verdict(Reaction.HOLD, doubt)
-    return replace(latch, unsafe_since_s=since_s), Verdict(Reaction.STOP, doubt)
+    return replace(safe, unsafe_since_s=since_s), Verdict(Reaction.STOP, doubt)
 
 
 def awaited(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> Reason[WaitReason] | None:

@@ -92,8 +92,9 @@ class MissionLimits:
         executor, pose = self._run.executor, self._run.vehicle.pose_at(now_s)
         if self._run.vehicle.in_auto or executor is None or pose is None:
             return None
-        if self._batteries.level(now_s) is not BatteryLevel.RETURN:
-            return self.must_stop(now_s)
+        level = self._batteries.level(now_s)
+        if level is not BatteryLevel.RETURN:
+            return None if level is BatteryLevel.FINE else self.must_stop(now_s)
         self._outcome.broken_off = self._batteries.reason
         if not executor.returning:
             frame = LocalFrame(executor.layout.origin)

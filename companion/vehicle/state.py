@@ -6,9 +6,10 @@ Nouns: vehicle state.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 
+from companion.core.changed import changed
 from companion.core.frames import Pose
 from companion.vehicle import guard
 from companion.vehicle.auto_leg import GuidedLeg, LegState, leg_after, leg_at_heartbeat
@@ -65,7 +66,7 @@ class EkfQuantity(Enum):
     VELOCITY = "velocity"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class VehicleState:
     """The newest event of each kind; None until the first."""
 
@@ -181,21 +182,21 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
         case LocalPositionSeen():
             return _with_position(state, event)
         case AttitudeSeen():
-            return replace(state, attitude=event)
+            return changed(state, attitude=event)
         case ThrottleSeen():
-            return replace(state, throttle=event)
+            return changed(state, throttle=event)
         case GlobalPositionSeen():
-            return replace(state, global_position=event)
+            return changed(state, global_position=event)
         case EkfStatusSeen():
-            return replace(state, ekf=event)
+            return changed(state, ekf=event)
         case RangeSeen():
-            return replace(state, scan=event, scan_ahead=_seen_ahead(state.scan_ahead, event))
+            return changed(state, scan=event, scan_ahead=_seen_ahead(state.scan_ahead, event))
         case TargetSeen():
-            return replace(state, target=event)
+            return changed(state, target=event)
         case SticksSeen():
-            return replace(state, sticks=sticks_after(state.sticks, event))
+            return changed(state, sticks=sticks_after(state.sticks, event))
         case TimeAnswered():
-            return replace(state, latency=latency_after_answer(state.latency, event))
+            return changed(state, latency=latency_after_answer(state.latency, event))
         case _:
             return _fold_rare(state, event)
 
@@ -204,21 +205,21 @@ def _fold_rare(state: VehicleState, event: Event) -> VehicleState:
     """The state after an event of a rarer kind."""
     match event:
         case OriginSeen():
-            return replace(state, origin=event)
+            return changed(state, origin=event)
         case HomeSeen():
-            return replace(state, home=event)
+            return changed(state, home=event)
         case OtherSeen():
-            return replace(state, others=_with_other(state.others, event))
+            return changed(state, others=_with_other(state.others, event))
         case LegSeen() | ItemReachedSeen() | ItemCurrentSeen():
-            return replace(state, leg=leg_after(state.leg, event))
+            return changed(state, leg=leg_after(state.leg, event))
         case PrearmSeen():
-            return replace(state, prearm=event)
+            return changed(state, prearm=event)
         case GpsSeen():
-            return replace(state, gps=event)
+            return changed(state, gps=event)
         case BatterySeen():
-            return replace(state, battery=event) if event.number == FIRST_BATTERY else state
+            return changed(state, battery=event) if event.number == FIRST_BATTERY else state
         case GuardSeen():
-            return replace(state, guard=event)
+            return changed(state, guard=event)
         case ParameterSeen():
             return _with_parameter(state, event)
         case _:
@@ -236,7 +237,7 @@ def _seen_ahead(before: RangeSeen | None, event: RangeSeen) -> RangeSeen | None:
 def _with_parameter(state: VehicleState, event: ParameterSeen) -> VehicleState:
     if event.name not in PARAMETERS_KEPT or state.parameters.get(event.name) == event.value:
         return state
-    return replace(state, parameters={**state.parameters, event.name: event.value})
+    return changed(state, parameters={**state.parameters, event.name: event.value})
 
 
 def _with_other(others: dict[str, OtherSeen], event: OtherSeen) -> dict[str, OtherSeen]:
@@ -251,12 +252,12 @@ def _with_heartbeat(state: VehicleState, event: HeartbeatSeen) -> VehicleState:
     A person who sets the companion's mode again accepts the position, the clock and the sticks as they are.
     """
     leg = leg_at_heartbeat(state.leg, event.time_s, in_auto=event.armed and event.mode == RoverMode.AUTO)
-    before, state = state.heartbeat, replace(state, heartbeat=event, leg=leg)
+    before, state = state.heartbeat, changed(state, heartbeat=event, leg=leg)
     if before is None:
         return state
     if before.mode != state.own_mode == event.mode:
-        return replace(state, frozen=False, restarted=False, sticks=Sticks())
-    return replace(state, sticks=Sticks()) if event.armed and not before.armed else state
+        return changed(state, frozen=False, restarted=False, sticks=Sticks())
+    return changed(state, sticks=Sticks()) if event.armed and not before.armed else state
 
 
 def _with_position(state: VehicleState, now: LocalPositionSeen) -> VehicleState:
@@ -264,11 +265,11 @@ def _with_position(state: VehicleState, now: LocalPositionSeen) -> VehicleState:
     before = state.position
     if before is not None and now.boot_s < before.boot_s - BACK_S:
         off_m = jump_m(before, now, clock_jumped=True)
-        return replace(state, position=now, jump_m=off_m, restarted=True, latency=Latency(), reckoned=None)
+        return changed(state, position=now, jump_m=off_m, restarted=True, latency=Latency(), reckoned=None)
     latency = latency_after_report(state.latency, now.time_s, now.boot_s)
     clock_jumped = latency.jumped_s == now.time_s
     so_far, frozen = reckoning_after(None if clock_jumped else state.reckoned, before, now)
     off_m = jump_m(before, now, clock_jumped=clock_jumped)
     frozen = state.frozen or frozen
     wander = drift_after(state.wander, before, now)
-    return replace(state, position=now, jump_m=off_m, reckoned=so_far, frozen=frozen, latency=latency, wander=wander)
+    return changed(state, position=now, jump_m=off_m, reckoned=so_far, frozen=frozen, latency=latency, wander=wander)

@@ -1,5 +1,7 @@
 """What one sensor has just seen no other sensor frees."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from companion.core.scan import RangeScan
@@ -10,8 +12,8 @@ def scan(time_s: float, source: str = "lidar", sender: int = 1) -> RangeScan:
     return RangeScan(time_s, np.zeros(1), np.ones(1), 0.1, 8.0, 0.1, source, sender)
 
 
-def cells(*places: tuple[int, int]) -> np.ndarray:
-    return np.array(places, np.int64).reshape(-1, 2)
+def cells(*places: tuple[int, int]) -> Callable[[], np.ndarray]:
+    return lambda: np.array(places, np.int64).reshape(-1, 2)
 
 
 def test_the_hits_of_other_sensors_count_and_its_own_do_not() -> None:

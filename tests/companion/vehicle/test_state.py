@@ -62,7 +62,7 @@ def test_the_newest_is_kept(event: Event, name: str) -> None:
         "in_auto",
         "wander",
     )
-    others = {field for field in VehicleState.__slots__ if field not in (name, *made)}
+    others = {field for field in VehicleState.__dataclass_fields__ if field not in (name, *made)}
     assert all(getattr(state, other) is None for other in others)
 
 
