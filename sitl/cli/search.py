@@ -15,7 +15,7 @@ from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.workers import driven_here
 from sitl.cli.runs import FILE, check_all, progress, warm_up_all
-from sitl.search.found_file import differences, write_find
+from sitl.search.found_file import counted_from, differences, write_find
 from sitl.search.goals import Goal
 from sitl.search.minimise import minimised
 from sitl.search.search import Find, first_bases, searched
@@ -72,12 +72,13 @@ def _of_each_kind(finds: Sequence[Find]) -> list[Find]:
 
 def _put_out(least: Sequence[Find], finds: Sequence[Find], file: Path, goal: Goal, place: Path) -> None:
     for find in least:
-        spec, result = find.spec, find.result
-        target = place / "found" / f"{find.rule}-{spec.id}.toml"
+        result, folder = find.result, place / "found"
+        spec = counted_from(find.spec, file, folder)
+        target = folder / f"{find.rule}-{spec.id}.toml"
         with written(target):
-            write_find(find, target, file, f"rover-sitl campaign {file.name} --search {goal}")
+            write_find(find, spec, target, f"rover-sitl campaign {file.name} --search {goal}")
         typer.echo(
-            f"{find.rule}: {spec.world}, seed {spec.seed}, {result.led_by or spec.controller}: {result.outcome}, "
+            f"{find.rule}: {find.spec.world}, seed {spec.seed}, {result.led_by or spec.controller}: {result.outcome}, "
             f"touched {result.touched}, closest {result.clearance_m:g} m"
         )
         typer.echo(f"  differs: {differences(find)}")

@@ -4,30 +4,43 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 from sitl.campaign.run_spec import RunSpec
-from sitl.campaign.worded import GroundSpec, SensorSpec, Worded
+from sitl.campaign.worded import GroundSpec, Worded
 from sitl.search.search import Find
 
 
-def write_find(find: Find, file: Path, campaign: Path, command: str) -> None:
-    """``campaign``: the file from which it was searched. Raises OSError."""
-    spec, result = find.spec, find.result
-    here = _from(campaign.resolve().parent, file.resolve().parent)
+def counted_from(spec: RunSpec, campaign: Path, folder: Path) -> RunSpec:
+    """The same run for a campaign in ``folder``: the files that it names count from there.
+
+    ``campaign``: the file that it comes from.
+    """
+
+    def here(name: str) -> str:
+        old, new = campaign.resolve().parent, folder.resolve()
+        return os.path.relpath(old / name, new) if name.endswith((".toml", ".plan", ".waypoints")) else name
+
+    sensors = Worded.of(spec.sensors)
     world = spec.world if GroundSpec.of(spec.world) is not None else here(spec.world)
-    sensors = SensorSpec.of(spec.sensors)
+    return replace(spec, world=world, sensors=str(Worded(here(sensors.name), sensors.values)), faults=here(spec.faults))
+
+
+def write_find(find: Find, spec: RunSpec, file: Path, command: str) -> None:
+    """``spec``: the run as it counts from the file's folder. Raises OSError."""
+    result = find.result
     lines = [
         f"# Found by: {command}",
         f"# {find.rule}: outcome {result.outcome}, touched {result.touched}, refused {result.refused}, "
         f"closest {result.clearance_m:g} m",
-        f"worlds = [{json.dumps(world)}]",
+        f"worlds = [{json.dumps(spec.world)}]",
         f"seed = {spec.seed}",
         "runs = 1",
         f"planners = [{json.dumps(spec.planner)}]",
         f"controllers = [{json.dumps(spec.controller)}]",
-        f"sensors = [{json.dumps(_worded(spec.sensors, here(sensors.name)))}]",
-        f"faults = [{json.dumps(here(spec.faults))}]",
+        f"sensors = [{json.dumps(spec.sensors)}]",
+        f"faults = [{json.dumps(spec.faults)}]",
         f"guard = [{json.dumps(spec.guard)}]",
         f"off_model = [{json.dumps(spec.off_model)}]",
         f"late_s = [{json.dumps(spec.late_s)}]",
@@ -41,19 +54,6 @@ def write_find(find: Find, file: Path, campaign: Path, command: str) -> None:
 def differences(find: Find) -> str:
     """What differs from the usual, in words."""
     return str(Worded("", dict(find.values))).strip() or "nothing"
-
-
-def _from(old: Path, new: Path):  # type: ignore[no-untyped-def]
-    """Names of files that count from one folder, counted from another."""
-
-    def named(name: str) -> str:
-        return os.path.relpath(old / name, new) if name.endswith((".toml", ".plan", ".waypoints")) else name
-
-    return named
-
-
-def _worded(text: str, name: str) -> str:
-    return str(Worded(name, Worded.of(text).values))
 
 
 def _settings(spec: RunSpec) -> list[str]:

@@ -131,3 +131,42 @@ def test_planners_side_by_side_are_a_campaign_with_a_plot(campaign: Path, monkey
     assert [line["run"]["planner"] for line in lines_of(Path("out/compare"))] == ["astar", "dijkstra"]
     bad = CliRunner().invoke(app, ["compare", "yard.toml", "--planners", "astr"])
     assert bad.exit_code == 2 and "unknown planner 'astr'" in bad.output
+
+
+GLASS = 'size_m = [20.0, 10.0]\n[[obstacle]]\nline_m = [[0.0, 8.0], [10.0, 8.0]]\nwidth_m = 0.3\nmaterial = "glass"\n'
+BEHIND = '[[target]]\nnorth_m = 0.0\neast_m = 12.0\n[sitl]\nworld = "glass.toml"\nstart = [5, 5]\nheading_deg = 90.0\n'
+
+
+def test_a_search_finds_makes_small_and_writes_what_drives_the_same_again(tmp_path: Path) -> None:
+    """A pane of glass that no sensor sees stands in the way: nothing needs to differ from the usual."""
+    (tmp_path / "glass.toml").write_text(GLASS)
+    (tmp_path / "behind.toml").write_text(BEHIND)
+    file, out = tmp_path / "panes.toml", tmp_path / "out"
+    file.write_text('worlds = ["behind.toml"]\ntime_limit_s = 52.0\n[search]\nparts = ["rover"]\n')
+    command = ["campaign", str(file), "--search", "collision", "--budget", "4", "--out", str(out)]
+    result = CliRunner().invoke(app, command, env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.output
+    (found,) = (out / "search-collision" / "found").glob("collision-*.toml")
+    told = result.stdout.splitlines()
+    assert told[-4].startswith("collision: behind.toml, seed 0, points: collision, touched")
+    assert told[-3] == "  differs: nothing"
+    assert told[-2] == f"  again: rover-sitl campaign {found} --replay {found.stem[-12:]} --record out/run"
+    assert told[-1].endswith("runs went wrong, of 1 kinds")
+    number = len(lines_of(out / "search-collision"))
+
+    again = CliRunner().invoke(app, command, env={"COLUMNS": "200"})
+    assert again.stdout.splitlines()[-4:] == told[-4:], "the same search"
+    assert len(lines_of(out / "search-collision")) == number, "nothing is driven twice"
+
+    replayed = CliRunner().invoke(
+        app, ["campaign", str(found), "--replay", found.stem[-12:], "--record", str(tmp_path / "run")]
+    )
+    assert replayed.exit_code == 0 and "1 contacts" in replayed.output, replayed.output
+
+
+def test_a_search_without_the_optimiser_is_one_line(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cma", None)
+    command = ["campaign", str(campaign), "--search", "stuck", "--out", str(campaign.parent / "out")]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 2
+    assert result.output.splitlines()[-1] == "--search: cma is not installed; install rover-companion[search]"

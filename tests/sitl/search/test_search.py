@@ -12,7 +12,7 @@ from sitl.campaign.campaign_file import CampaignTable, SearchTable, load_campaig
 from sitl.campaign.policies import Policy
 from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
 from sitl.campaign.worded import SensorSpec
-from sitl.search.found_file import differences, write_find
+from sitl.search.found_file import counted_from, differences, write_find
 from sitl.search.goals import Goal, distance, shows
 from sitl.search.minimise import minimised
 from sitl.search.search import Find, first_bases, searched
@@ -74,9 +74,9 @@ def test_a_find_is_made_as_small_as_it_can_be(finds: list[Find]) -> None:
 def test_a_find_is_written_as_a_campaign_of_one_run_the_same(finds: list[Find], tmp_path: Path) -> None:
     least = minimised(finds[0], made_up)
     file = tmp_path / "found" / "one.toml"
-    write_find(least, file, tmp_path / "c.toml", "rover-sitl campaign c.toml --search collision")
-    (spec,) = specs_of(load_campaign(file))
-    assert spec == least.spec and spec.id == least.spec.id
+    spec = counted_from(least.spec, tmp_path / "c.toml", file.parent)
+    write_find(least, spec, file, "rover-sitl campaign c.toml --search collision")
+    assert list(specs_of(load_campaign(file))) == [spec] == [least.spec]
     assert "dropout=" in differences(least)
 
 
@@ -85,8 +85,9 @@ def test_files_of_a_find_count_from_its_own_folder(tmp_path: Path) -> None:
     table = CampaignTable(worlds=["yard.toml"])
     base = first_bases(table)[0]
     find = Find(Goal.STUCK, base, (), {}, made_up([base])[0])
-    write_find(find, tmp_path / "a" / "b" / "one.toml", tmp_path / "c.toml", "...")
-    assert load_campaign(tmp_path / "a" / "b" / "one.toml").worlds == ["../../yard.toml"]
+    file = tmp_path / "a" / "b" / "one.toml"
+    write_find(find, counted_from(base, tmp_path / "c.toml", file.parent), file, "...")
+    assert load_campaign(file).worlds == ["../../yard.toml"]
 
 
 @pytest.mark.parametrize(
