@@ -95,6 +95,13 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             fits(desktop, PHONE)
             assert "Enter token to act" in desktop.text
             assert desktop.run("return document.querySelectorAll('.actions button').length") == 1, "nobody may act"
+            desktop.press("Enter token to act")
+            desktop.run("document.querySelector('#token').value = 'not the token'")
+            desktop.press("Connect")
+            desktop.shows("This token is wrong")
+            fits(desktop, PHONE)
+            desktop.press("Cancel")
+            desktop.shows(f"Driving to {name}", "Enter token to act")
             program.child.send_signal(signal.SIGINT)
             desktop.shows("Stopped by the user")
 
