@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 from urllib.parse import quote
@@ -15,6 +17,10 @@ from companion.viewer.live_viewer import LiveViewer
 from companion.viewer.web_process import WebError, WebPlace, web_place
 
 __all__ = ["Actions", "Token", "Web", "WebError", "asked_place", "served", "web_viewer"]
+
+ALL_ADDRESSES = "0.0.0.0"
+SOMEWHERE = ("192.0.2.1", 9)
+"""An address that is nobody's: nothing is sent there."""
 
 Web = Annotated[
     str | None,
@@ -70,4 +76,16 @@ def served(place: WebPlace, *, to_person: bool) -> str:
     """Where the page is. A person gets the token with it, behind a # that browsers keep; a log file does not."""
     token = f"#token={quote(place.token, safe='')}" if place.token and to_person else ""
     to_all = ", for all who can reach this address and know the token" if place.private else ""
-    return f"the run is shown at {place.url}{token}{to_all}"
+    own = own_address() if place.host == ALL_ADDRESSES else None
+    shown = place if own is None else replace(place, host=own)
+    return f"the run is shown at {shown.url}{token}{to_all}"
+
+
+def own_address() -> str | None:
+    """The address at which the network reaches this computer; None without a network."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        try:
+            asking.connect(SOMEWHERE)  # chooses the interface, and sends nothing
+        except OSError:
+            return None
+        return str(asking.getsockname()[0])

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from companion.viewer.film_names import film_names
 from companion.viewer.map_colours import CELL_COLOURS, UNKNOWN_COLOUR
 from companion.viewer.map_tiles import TILE, UNKNOWN, cells_of
 from companion.viewer.wire import tiles_in
@@ -178,13 +179,14 @@ class FilmPicture:
             self._disc(pen, target["place"], 6.0, REACHED if reached else GOAL)
 
     def _names(self, pen: ImageDraw.ImageDraw) -> None:
-        """The targets' names, within the picture."""
-        for target in self._scene["targets"]:
-            x, y = (value / FINER for value in self._at(target["place"]))
-            half = pen.textlength(target["name"], self._small) / 2.0 + 3.0
-            x = min(max(x, half), self._section.width - half)
-            y = y - 16.0 if y > 30.0 else y + 16.0
-            pen.text((x, y), target["name"], INK, self._small, anchor="mm", stroke_width=2, stroke_fill=HALO)
+        """The targets' names."""
+        targets = [
+            (target["name"], *(value / FINER for value in self._at(target["place"])))
+            for target in self._scene["targets"]
+        ]
+        size = (self._section.width, self._section.height)
+        for name in film_names(targets, lambda text: pen.textlength(text, self._small), size):
+            pen.text((name.x, name.y), name.text, INK, self._small, anchor="mm", stroke_width=2, stroke_fill=HALO)
 
     def _rover(self, pen: ImageDraw.ImageDraw, pose: Sequence[float]) -> None:
         """Its outline, or an arrow where that would be too small to see."""

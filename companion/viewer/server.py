@@ -113,7 +113,7 @@ class WebApp:
         knows = isinstance(given, str) and bool(self._token) and _same(given, self._token)
         if (given is not None and not knows) or (self._private and not knows):
             await asyncio.sleep(WRONG_TOKEN_S)
-            text = "This token is wrong." if given else "A token is needed; the program has printed it."
+            text = "This token is wrong." if given else "The file that --web-token names has it."
             await socket.send_text(json.dumps({"kind": "denied", "text": text}))
             await socket.close(DENIED)
             return None

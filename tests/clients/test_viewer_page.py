@@ -25,6 +25,11 @@ for (let i = 0; i < data.length; i += 4 * 97) seen.add(data[i] << 16 | data[i + 
 return seen.size
 """
 """How many colours there are on the map."""
+STICKS_OUT = """
+return [...document.querySelectorAll('body *')].filter(one => one.checkVisibility() && !one.closest('.scroll')
+    && (one.getBoundingClientRect().right > innerWidth + 1 || one.getBoundingClientRect().left < -1))
+    .map(one => `${one.className}: ${one.textContent.slice(0, 60)}`)
+"""
 
 
 def address_of(program: Program) -> str:
@@ -42,15 +47,18 @@ def clock_of(shown: Page) -> str:
 
 
 def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_killed(tmp_path: Path) -> None:
-    mission = MISSIONS / "rooms.toml"
+    name = f"the far end {'Kabeltrommellagerplatz' * 2}"  # with a word that is wider than a phone
+    mission = tmp_path / "rooms.toml"
+    text = (MISSIONS / "rooms.toml").read_text(encoding="utf-8").replace("far end", name)
+    mission.write_text(text.replace('"maps/', f'"{MISSIONS}/maps/'), encoding="utf-8")
     token = tmp_path / "token"
     acting = ("--web-token", token, "--web-actions")
     with ours(tmp_path, "sitl", "drive", mission, "--web", "0", *acting, "--speedup", "1") as program:
         address = address_of(program)
-        program.says("Heading for far end")
+        program.says(f"Heading for {name}")
         with page(DESKTOP) as desktop:
             desktop.open(f"{address}#token={token.read_text(encoding='ascii').strip()}")
-            desktop.shows("Driving to far end", "GUIDED", "Heading for far end", "companion")
+            desktop.shows(f"Driving to {name}", "GUIDED", f"Heading for {name}", "companion")
             assert int(str(desktop.run(DRAWN))) > 8
             fits(desktop, DESKTOP)
             killed = web_process_of(program)
@@ -60,7 +68,7 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.until(lambda: "Driving to" in desktop.text)
             before = clock_of(desktop)
             desktop.until(lambda: clock_of(desktop) != before and "Driving to" in desktop.text)
-            assert "Heading for far end" in desktop.text and "No connection" not in desktop.text
+            assert f"Heading for {name}" in desktop.text and "No connection" not in desktop.text
             assert [fault for fault in desktop.faults if "WebSocket" not in fault and "ERR_" not in fault] == []
             desktop.press("Pause")
             desktop.shows("HOLD", "Paused on request")
@@ -74,22 +82,34 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows("Leave out requested goal 1?")
             desktop.press("Skip")
             desktop.shows("Skip target: done", "Skipping requested goal 1 as requested")
-            desktop.run("sessionStorage.clear(); localStorage.clear()")
             desktop.resize(PHONE)
+            desktop.until(lambda: f"Driving to {name}" in desktop.text)
+            desktop.press("Skip target")
+            desktop.shows(f"Leave out {name}?")
+            fits(desktop, PHONE)
+            desktop.run("sessionStorage.clear(); localStorage.clear()")
             desktop.open("about:blank")
             desktop.open(address)
-            desktop.shows("Driving to far end", "GUIDED")
+            desktop.shows(f"Driving to {name}", "GUIDED")
             assert int(str(desktop.run(DRAWN))) > 8
             fits(desktop, PHONE)
             assert "Enter token to act" in desktop.text
             assert desktop.run("return document.querySelectorAll('.actions button').length") == 1, "nobody may act"
+            desktop.press("Enter token to act")
+            desktop.run("document.querySelector('#token').value = 'not the token'")
+            desktop.press("Connect")
+            desktop.shows("This token is wrong")
+            fits(desktop, PHONE)
+            desktop.press("Cancel")
+            desktop.shows(f"Driving to {name}", "Enter token to act")
             program.child.send_signal(signal.SIGINT)
             desktop.shows("Stopped by the user")
 
 
 def fits(shown: Page, size: tuple[int, int]) -> None:
-    """Nothing is wider than the window."""
+    """Nothing is wider than the window, or sticks out of it where it cannot be scrolled."""
     assert int(str(shown.run("return document.documentElement.scrollWidth"))) <= size[0]
+    assert shown.run(STICKS_OUT) == []
 
 
 def test_the_simulator_alone_is_shown_as_such(tmp_path: Path) -> None:

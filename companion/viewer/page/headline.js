@@ -5,6 +5,8 @@ import { setIcon } from "viewer/icons.js";
 import { distance, wayLeft } from "viewer/geometry.js";
 import { clock, metres, number, sentence } from "viewer/words.js";
 
+/** A line of more letters than this is written smaller. */
+const LONG = 40;
 const SIGNS = new Set(["driving", "waiting", "stopped", "ended", "connecting"]);
 
 export class Headline {
@@ -33,7 +35,9 @@ export class Headline {
     const state = trouble ? "offline" : SIGNS.has(frame?.state) ? frame.state : "connecting";
     setAttribute(this.node, "data-state", state);
     setIcon(this.sign, state === "ended" && reached(frame) < frame.statuses?.length ? "error" : state);
-    setText(this.line, trouble || sentence(frame?.line) || "Connecting");
+    const line = trouble || sentence(frame?.line) || "Connecting";
+    setText(this.line, line);
+    setAttribute(this.line, "data-long", line.length > LONG ? "" : null);
     setText(this.spoken, trouble ? trouble.replace(/ since.*/, "") : (frame?.line ?? ""));
     setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
     setText(this.mission, scene?.mission ?? "");

@@ -5,6 +5,13 @@ import { number } from "viewer/words.js";
 
 const BAR_PX = 80;
 const LEFT = 16;
+/** Scale and colours together are about as wide as this. */
+const WIDTH = 290;
+
+/** Takes their room, so no name lies below them. */
+export function claimFrame(pen) {
+  pen.taken.push([8, 12, 48, 48], [LEFT - 8, pen.camera.height - 42 - pen.camera.covered, WIDTH, 34]);
+}
 
 /** Draws them at the edges, above what covers the lower one. */
 export function drawFrame(pen, model) {

@@ -1,7 +1,7 @@
 // Marks with names: home, targets with their state, the goal; and pointers at the edge to what is out of view.
 
 import { distance } from "viewer/geometry.js";
-import { metres } from "viewer/words.js";
+import { metres, short } from "viewer/words.js";
 
 const RADIUS = 12;
 const FAILED = new Set(["unreachable", "timed out", "failed", "given up"]);
@@ -21,12 +21,20 @@ export function drawMarks(pen, scene, frame) {
   const current = goal
     ? targets.findIndex((target) => target.name === goal.name && distance(target.place, goal.place) < 0.5)
     : -1;
+  targets.forEach((target) => takeRoom(pen, target));
   if (current >= 0) drawRadius(pen, targets[current]);
   if (goal) drawGoal(pen, goal, current >= 0 ? String(current + 1) : "");
   if (scene.home) drawHome(pen, scene.home);
   targets.forEach((target, i) => {
     if (i !== current) drawTarget(pen, target, i, frame?.statuses?.[i] ?? "pending");
   });
+}
+
+// No name lies over a target's mark.
+function takeRoom(pen, target) {
+  const [x, y] = pen.camera.toScreen(...target.place);
+  const half = RADIUS + 2;
+  pen.taken.push([x - half, y - half, 2 * half, 2 * half]);
 }
 
 function drawRadius(pen, target) {
@@ -43,7 +51,7 @@ function drawGoal(pen, goal, sign) {
   pen.disc(x, y, RADIUS + 1, colours.goal, colours.halo, 2);
   pen.text(sign, x, y + 1, { size: 14, weight: 800, colour: colours.goalText, align: "center", halo: false });
   pen.taken.push([x - 20, y - 20, 40, 40]);
-  pen.label(goal.name, x, y, RADIUS + 14, { size: 16, weight: 750 });
+  pen.label(short(goal.name), x, y, RADIUS + 14, { size: 16, weight: 750 });
 }
 
 function drawHome(pen, home) {
@@ -78,7 +86,7 @@ function drawTarget(pen, target, index, status) {
   pen.disc(x, y, RADIUS + 2, colours.halo);
   pen.disc(x, y, RADIUS, fill, edge, 2);
   drawSign(pen, kind, index, x, y);
-  const name = kind === "pending" ? target.name : `${target.name} · ${status}`;
+  const name = kind === "pending" ? short(target.name) : `${short(target.name)} · ${status}`;
   pen.label(name, x, y, RADIUS + 5);
 }
 
@@ -126,7 +134,7 @@ export function drawPointers(pen, frame) {
   const rover = frame.pose.slice(0, 2);
   drawPointer(pen, rover, "rover");
   if (frame.goal)
-    drawPointer(pen, frame.goal.place, `${frame.goal.name}, ${metres(distance(rover, frame.goal.place))}`);
+    drawPointer(pen, frame.goal.place, `${short(frame.goal.name)}, ${metres(distance(rover, frame.goal.place))}`);
 }
 
 function drawPointer(pen, spot, text) {

@@ -11,7 +11,7 @@ import { Model } from "viewer/model.js";
 import { drawContacts } from "viewer/overlays.js";
 import { Panel } from "viewer/panel.js";
 import { buildShell, watchEdges } from "viewer/shell.js";
-import { askToken, findToken } from "viewer/token.js";
+import { askToken, findToken, forgetToken } from "viewer/token.js";
 import { lasting } from "viewer/words.js";
 
 /** Frames come five a second. Without one for as long as this, what is shown is old. */
@@ -35,7 +35,7 @@ class LivePage {
     this.charts = new Charts(charts, this.model);
     this.actions = new Actions(bar, viewer, this.model, this.view, {
       send: (message) => this.link.send(message),
-      askToken: () => this.askToken("Whoever knows it may act."),
+      askToken: () => this.askToken("Whoever knows it may act.", () => {}),
     });
     addFiguresButton(this.parts);
     watchEdges(this.parts, this.view);
@@ -69,15 +69,19 @@ class LivePage {
   deny(text) {
     this.denied = true;
     this.refresh();
-    this.askToken(text);
+    forgetToken();
+    // Who gave a wrong one may still be allowed to look on without any.
+    this.askToken(text, this.link.token ? () => this.enter(null) : null);
   }
 
-  askToken(text) {
-    askToken(this.parts.viewer, text, (token) => {
-      this.denied = false;
-      this.link.token = token;
-      this.link.connect();
-    });
+  askToken(text, cancelled) {
+    askToken(this.parts.viewer, text, (token) => this.enter(token), cancelled);
+  }
+
+  enter(token) {
+    this.denied = false;
+    this.link.token = token;
+    this.link.connect();
   }
 
   take(message) {

@@ -2,7 +2,7 @@
 
 import { theme } from "viewer/colours.js";
 import { claimMovers, drawAhead, drawMovers, drawRays, drawRover } from "viewer/layer_drive.js";
-import { drawFrame } from "viewer/layer_frame.js";
+import { claimFrame, drawFrame } from "viewer/layer_frame.js";
 import { drawBorders, drawGround } from "viewer/layer_ground.js";
 import { drawMarks, drawPointers } from "viewer/layer_marks.js";
 import { Pen } from "viewer/pen.js";
@@ -58,7 +58,7 @@ export class MapView {
     drawBorders(pen, model.scene);
     const frame = model.frame;
     // These take their room first, so no name covers them.
-    pen.taken.push([8, 12, 48, 48]);
+    claimFrame(pen);
     if (frame?.pose) pen.taken.push([...camera.toScreen(frame.pose[0], frame.pose[1]).map((at) => at - 16), 32, 32]);
     if (frame) claimMovers(pen, frame);
     for (const layer of this.below) layer(pen);

@@ -1,4 +1,4 @@
-// The panel beside the map: large numbers, targets, news, facts.
+// The panel beside the map: large numbers, news, targets, facts.
 
 import { make, setAttribute, setText } from "viewer/dom.js";
 import { facts, readouts, trueFacts } from "viewer/facts.js";
@@ -27,8 +27,9 @@ export class Panel {
       "div",
       { class: "sections" },
       make("div", { class: "readouts" }, ...this.numbers.map((each) => each.node)),
-      make("section", { class: "targets-section" }, this.targetsHead, this.asked, this.targets),
+      // What is new is seen without scrolling, however many targets there are.
       make("section", { class: "news-section" }, make("h2", {}, "News"), this.news.node),
+      make("section", { class: "targets-section" }, this.targetsHead, this.asked, this.targets),
       make("section", { class: "facts-section" }, make("h2", {}, "Facts"), this.facts),
     );
   }
@@ -96,8 +97,7 @@ export class Panel {
         { type: "button", class: "target", title: "Show on the map", onclick: () => this.go(target.place) },
         sign,
         make("span", { class: "target-name" }, `${i + 1}. ${target.name}`),
-        status,
-        far,
+        make("span", { class: "target-state" }, status, far),
       );
       return { node: make("li", {}, button), sign, status, far };
     });

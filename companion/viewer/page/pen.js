@@ -90,7 +90,7 @@ export class Pen {
       left > 4 &&
       left + width < this.camera.width - this.camera.coveredRight &&
       top > 4 &&
-      top + high < this.camera.height - 4;
+      top + high < this.camera.height - this.camera.covered - 4;
     const spot = spots.find((each) => inside(each) && this.claim(each[0], each[1], width, high));
     if (spot) this.text(text, spot[0], spot[1] + high / 2, options);
     return Boolean(spot);

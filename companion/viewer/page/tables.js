@@ -4,6 +4,8 @@ import { make } from "viewer/dom.js";
 
 /** A number, perhaps with how far it is from another in brackets; or a sign for none. */
 const NUMBER = /^([-−+]?\d[\d.,\s]*%?( \([-−+±]\d[\d.]*\))?|[-–]|)$/;
+/** A word that is wider than a column should be. */
+const LONG = /\S{19}/;
 
 /** All tables, then what the run was made with. */
 export function buildTables(record) {
@@ -33,7 +35,8 @@ export function buildTables(record) {
 function table(head, rows) {
   const numeric = head.map((_, i) => rows.every((row) => NUMBER.test(String(row[i] ?? "–"))));
   const shown = (value) => (value === "-" ? "–" : String(value ?? "–"));
-  const cell = (value, i) => make("td", { class: numeric[i] ? "right" : null }, shown(value));
+  const kind = (value, i) => (numeric[i] ? "right" : LONG.test(String(value)) ? "long" : null);
+  const cell = (value, i) => make("td", { class: kind(value, i) }, shown(value));
   return make(
     "div",
     { class: "scroll" },

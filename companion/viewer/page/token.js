@@ -7,7 +7,7 @@ const KEPT_AS = "viewer-token";
 /** The token, or null. It is removed from the address, so that nobody copies it with the address. */
 export function findToken() {
   const hash = location.hash.slice(1);
-  const given = new URLSearchParams(hash).get("token") ?? (hash.includes("=") ? null : decodeURIComponent(hash));
+  const given = new URLSearchParams(hash).get("token") ?? (hash.includes("=") ? null : decoded(hash));
   if (given) {
     keepToken(given);
     history.replaceState(null, "", location.pathname + location.search);
@@ -20,7 +20,15 @@ export function findToken() {
   }
 }
 
-export function keepToken(token) {
+function decoded(text) {
+  try {
+    return decodeURIComponent(text);
+  } catch {
+    return text; // a lone % sign
+  }
+}
+
+function keepToken(token) {
   try {
     sessionStorage.setItem(KEPT_AS, token);
   } catch {
@@ -28,8 +36,17 @@ export function keepToken(token) {
   }
 }
 
-/** Asks for the token; `given(token)` hears it. */
-export function askToken(root, text, given) {
+/** A token that was refused is not sent again by a reload. */
+export function forgetToken() {
+  try {
+    sessionStorage.removeItem(KEPT_AS);
+  } catch {
+    // Nothing was kept.
+  }
+}
+
+/** Asks for the token; `given(token)` hears it. With `cancelled` it can be closed without one, which that hears. */
+export function askToken(root, text, given, cancelled = null) {
   root.querySelector(".token-form")?.remove();
   const field = make("input", {
     type: "password",
@@ -39,6 +56,10 @@ export function askToken(root, text, given) {
     spellcheck: "false",
     required: true,
   });
+  const close = () => {
+    form.remove();
+    cancelled();
+  };
   const form = make(
     "form",
     { class: "token-form", "aria-label": "Token" },
@@ -47,7 +68,11 @@ export function askToken(root, text, given) {
     make("label", { for: "token" }, "Token"),
     field,
     make("button", { type: "submit", class: "strong" }, "Connect"),
+    cancelled && make("button", { type: "button", class: "wide", onclick: close }, "Cancel"),
   );
+  form.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" && cancelled) close();
+  });
   form.addEventListener("submit", (event) => {
     event.preventDefault();
     const token = field.value.trim();

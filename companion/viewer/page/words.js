@@ -56,6 +56,14 @@ export function heading(radians) {
   return `${String((degrees + 360) % 360).padStart(3, "0")}°`;
 }
 
+/** A name for the map, cut in the middle if it is long: its end may be what tells it from others. */
+export function short(name, most = 28) {
+  const letters = [...name];
+  if (letters.length <= most) return name;
+  const tail = Math.floor(most / 3);
+  return `${letters.slice(0, most - tail - 1).join("").trimEnd()}…${letters.slice(-tail).join("").trimStart()}`;
+}
+
 /** The first letter large: lines come in small letters. */
 export function sentence(text) {
   return text ? text[0].toUpperCase() + text.slice(1) : "";
