@@ -48,7 +48,8 @@ def map_case(file: Path, problems: int) -> Case:
     scenarios = scenario_file(file)
     if scenarios is None:
         raise MapError(
-            f"{file}: nothing says what to search; a MovingAI scenario file is needed beside it ({file.name}.scen)"
+            f"{file}: nothing says what to search; give --start and --target, or a MovingAI scenario file beside it "
+            f"({file.name}.scen)"
         )
     chosen = spread(read_scenarios(scenarios), problems)
     ends = tuple((scenario.start, scenario.target) for scenario in chosen if scenario.start != scenario.target)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -20,7 +21,8 @@ from companion.bench.page import write_page
 from companion.bench.peers import installed_peers
 from companion.bench.report import as_json, head, rows, runs_explained
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings, writable, written
-from companion.mapping.map_files import MapError
+from companion.cli.plan import PlaceError, place_of
+from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
 from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
 from companion.settings import Settings, SettingsError
@@ -33,7 +35,8 @@ class BenchError(ValueError):
 
 def bench(
     map_files: Annotated[
-        list[Path] | None, typer.Argument(metavar="[MAP]...", help="MovingAI maps with scenario files beside them.")
+        list[Path] | None,
+        typer.Argument(metavar="[MAP]...", help="Maps, with MovingAI scenario files beside them or --start, --target."),
     ] = None,
     sizes: Annotated[
         str, typer.Option(help="Sizes of the four shipped maps, times 100 x 50, commas between; '': none.")
@@ -43,6 +46,8 @@ def bench(
     seeds: Annotated[int, typer.Option(min=1, help="Searches on each map of planners that draw random numbers.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
     problems: Annotated[int, typer.Option(min=1, help="Number of problems of each MAP's scenario file.")] = 20,
+    start: Annotated[str | None, typer.Option(metavar="X,Y", help="Start on each MAP, instead of scenarios.")] = None,
+    target: Annotated[str | None, typer.Option(metavar="X,Y", help="Target on each MAP.")] = None,
     cell_s: Annotated[float, typer.Option(min=0.1, help="Time limit in seconds for one planner on one map.")] = 10.0,
     maps: Annotated[Path | None, typer.Option(help="Folder with the four maps; default: missions/maps.")] = None,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
@@ -59,13 +64,23 @@ def bench(
         settings = usable_settings(settings_file)
         writable(json_file)
         writable(docs and docs / "benchmarks.md")
-        cases = _cases(map_files or [], sizes, maps, problems)
+        cases = _cases(map_files or [], sizes, maps, lambda file: _of_map(file, problems, start, target))
         contestants = _contestants(planners, settings, console, peers=peers)
         limits = Limits(seeds, seed, cell_s)
+        if not console.is_terminal:
+            typer.echo("compiling, once on this machine, if that has not been done ...", err=True)
         with console.status("compiling (once a machine) ..."):
             warm_up()
         entries = _with_progress(contestants, cases, limits, console)
-    except (SettingsError, MapError, ScenarioFileError, UnknownPlannerError, OutputError, BenchError) as error:
+    except (
+        SettingsError,
+        MapError,
+        ScenarioFileError,
+        UnknownPlannerError,
+        OutputError,
+        BenchError,
+        PlaceError,
+    ) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     for table in _tables(entries, contestants, cases):
@@ -90,7 +105,18 @@ def bench(
         raise typer.Exit(EXIT_BAD_INPUT) from error
 
 
-def _cases(files: list[Path], sizes: str, maps: Path | None, problems: int) -> list[Case]:
+def _of_map(file: Path, problems: int, start: str | None, target: str | None) -> Case:
+    """The problems of one MAP. Raises MapError, ScenarioFileError, PlaceError, BenchError."""
+    if start is None and target is None:
+        return map_case(file, problems)
+    if start is None or target is None:
+        raise BenchError("--start and --target go together, as in --start 0,24 --target 98,24")
+    grid = load_map(file)
+    ends = place_of("--start", start, grid, False), place_of("--target", target, grid, False)
+    return Case(file.stem, 1, grid.weights, (ends,))
+
+
+def _cases(files: list[Path], sizes: str, maps: Path | None, of_map: Callable[[Path], Case]) -> list[Case]:
     try:
         scales = tuple(sorted({int(size) for size in sizes.split(",") if size}))
     except ValueError:
@@ -99,7 +125,7 @@ def _cases(files: list[Path], sizes: str, maps: Path | None, problems: int) -> l
         raise BenchError(f"--sizes {sizes}: from 1 to 100")
     folder = maps or (shipped() or SOURCE) / "maps"
     cases = paper_cases(folder, scales) if scales else []
-    cases += [map_case(file, problems) for file in files]
+    cases += [of_map(file) for file in files]
     if not cases:
         raise BenchError("nothing to measure: give --sizes or a MAP")
     return cases

@@ -26,11 +26,12 @@ from companion.diagnosis.finding import Finding, Level
 from companion.diagnosis.payload import Command, parameters_of, payload
 from companion.executive.warm_up import kernels_warm
 from companion.lidar.examination import LidarHeard, lidar_findings
-from companion.lidar.reader import Lidars, lidars_on
+from companion.lidar.reader import LidarReader, Lidars, lidars_on
 from companion.lidar.serial_port import open_ports
 from companion.lidar.spec import LidarError, LidarSpec
-from companion.lidar.trouble import trouble
+from companion.lidar.trouble import LidarTrouble, trouble
 from companion.mapping.map_files import MapError
+from companion.mavlink import port_users
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import ByteLink, LinkError, open_link
@@ -206,9 +207,19 @@ class _Wired:
     def heard(self, seconds: float) -> list[LidarHeard]:
         """What was heard of each."""
         return [
-            LidarHeard(one.name, one.spec.port, seconds, one.counters, self._newest.get(one.name), trouble(one))
+            LidarHeard(one.name, one.spec.port, seconds, one.counters, self._newest.get(one.name), _with_rivals(one))
             for one in self.lidars.readers
         ]
+
+
+def _with_rivals(lidar: LidarReader) -> LidarTrouble | None:
+    """What is wrong with a lidar, with the other programs that have its port open and take bytes away."""
+    found = trouble(lidar)
+    users = port_users.of_device(lidar.spec.port)
+    if found is None or not users:
+        return found
+    says = f"{found.says}; {port_users.in_words(users)} has the same port open and takes bytes away"
+    return replace(found, says=says, remedy="stop that program")
 
 
 def _show(

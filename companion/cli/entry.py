@@ -11,6 +11,7 @@ from types import FrameType
 from typing import cast
 
 from companion.cli import kernel_cache
+from companion.core.interrupts import is_interrupt
 
 EXIT_USAGE, EXIT_STOPPED = 2, 130
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -94,7 +95,7 @@ def _run(name: str, commands: Callable[..., object]) -> int:
         print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)
         return EXIT_USAGE
     except SystemError as error:  # an interrupt inside a compiled loop
-        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+        if is_interrupt(error):
             raise KeyboardInterrupt from None
         raise
     except BrokenPipeError:  # the reader has closed its end (`... | head`)

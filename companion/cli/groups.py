@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import shutil
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import typer
 from typer.core import TyperGroup
+
+NARROW_COLUMNS = 80
 
 
 def group(name: str, text: str, places: Mapping[str, str]) -> typer.Typer:
@@ -19,7 +22,7 @@ def group(name: str, text: str, places: Mapping[str, str]) -> typer.Typer:
 
     class Group(TyperGroup):
         def __init__(self, **attributes: Any) -> None:
-            super().__init__(**attributes)
+            super().__init__(**{**attributes, "rich_markup_mode": _markup()})
             self.commands: Any = _Commands(places)
 
     app = typer.Typer(
@@ -59,7 +62,13 @@ def _loaded(name: str, place: str) -> Any:
         app = typer.Typer(add_completion=False)
         app.command(name)(found)
         found = app
+    found.rich_markup_mode = _markup()
     return typer.main.get_command(found)
+
+
+def _markup() -> Literal["rich"] | None:
+    """On a narrow terminal plain text, which is wrapped; the columns of a table would be cut there."""
+    return "rich" if shutil.get_terminal_size().columns >= NARROW_COLUMNS else None
 
 
 def _options(name: str) -> Any:

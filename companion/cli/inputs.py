@@ -29,6 +29,10 @@ Laps = Annotated[
 ]
 
 
+EXIT_NOT_WRITTEN = 5
+"""The command has done its work, and could not write a file about it."""
+
+
 class OutputError(Exception):
     """A file that cannot be written; the text is one line with file, reason and remedy."""
 

@@ -182,12 +182,25 @@ def _maps(mission: Mission) -> list[str]:
     if mission.prior_map is not None:
         lines.append(f"known map: {mission.prior_map}: {_map_text(load_map(mission.prior_map, resolution_m))}")
     if sitl is not None and sitl.world is not None and sitl.world.suffix.lower() == ".toml":
-        read_toml(sitl.world, MissionError)
+        size_m = read_toml(sitl.world, MissionError).get("size_m")
+        if isinstance(size_m, list) and len(size_m) == len(("east", "north")):
+            _check_inside(mission, sitl.resolution_m or resolution_m, *map(float, size_m))
         lines.append(f"simulator's world: {sitl.world}: a world file; what it describes only rover-sitl checks")
     elif sitl is not None and sitl.world is not None:
         world = load_map(sitl.world, sitl.resolution_m or resolution_m)
+        _check_inside(mission, world.resolution_m, world.width * world.resolution_m, world.height * world.resolution_m)
         lines.append(f"simulator's world: {sitl.world}: {_map_text(world)}")
     return lines
+
+
+def _check_inside(mission: Mission, field_m: float, east_m: float, north_m: float) -> None:
+    """Raises MissionError where ``sitl.start``, in fields of ``field_m``, lies outside a world of this size."""
+    cell = mission.sitl.start if mission.sitl is not None else None
+    if cell is None:
+        return
+    if not (0.0 <= (cell.x + 0.5) * field_m < east_m and 0.0 <= (cell.y + 0.5) * field_m < north_m):
+        says = f"field {cell.x}, {cell.y} lies outside the world ({east_m:g} m east, {north_m:g} m north)"
+        raise MissionError(f"{mission.source or mission.name}: sitl.start: {says}; fields are of {field_m:g} m here")
 
 
 def _map_text(grid: Grid) -> str:

@@ -146,7 +146,8 @@ def run(
             if mission is None:
                 raise SystemExit(EXIT_STOPPED)
             mission = refuse_arming(with_laps(mission, laps), arm=arm)
-            keeping = RunState(mission, state, resume=resume, say=say)
+            # The link first: with a wrong one nothing is written.
+            link, keeping = _opened(source, say), RunState(mission, state, resume=resume, say=say)
             ends.callback(keeping.close)
             if keeping.ended:
                 raise typer.Exit(_print_statuses(keeping.statuses))
@@ -165,7 +166,7 @@ def run(
                 if record
                 else NullRecorder()
             )
-            lidars, link = _lidars(specs, recorder, ends), _opened(source, say)
+            lidars = _lidars(specs, recorder, ends)
             with console.status("loading the planner ..."):
                 _load_planner(settings, mission, say)
             _drop(link, lidars)

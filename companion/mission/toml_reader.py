@@ -53,7 +53,7 @@ from companion.mission.tables import (
     named,
     refuse_swapped,
 )
-from companion.storage.toml_file import read_table
+from companion.storage.toml_file import read_table, read_toml
 
 MAX_COMMANDS = 100
 """Of one place."""
@@ -94,6 +94,10 @@ class PlaceTable(Table):
                 raise ValueError("lat_deg and lon_deg are both needed")
             return GeoPoint(self.lat_deg, self.lon_deg)
         return None
+
+
+OF_WORLDS = {"base", "size_m", "obstacle", "door", "slippery", "rough", "mover"}
+"""What only world files have."""
 
 
 class CommandTable(Table):
@@ -317,10 +321,20 @@ def load(path: Path, *, simulated: bool = True) -> Mission:
 
     Raises MissionError: one line with file, place and reason.
     """
+    _refuse_world(path)
     table = read_table(path, MissionTable, MissionError)
     mission = _mission(table if simulated else table.model_copy(update={"sitl": None}), path)
     check_mission(mission)
     return mission
+
+
+def _refuse_world(path: Path) -> None:
+    """Raises MissionError for a world file of the simulator."""
+    keys = read_toml(path, MissionError).keys()
+    if keys & OF_WORLDS and not keys & set(MissionTable.model_fields):
+        raise MissionError(
+            f'{path}: describes a world of the simulator, and no mission; name it in one: [sitl] world = "{path.name}"'
+        )
 
 
 def _mission(table: MissionTable, path: Path) -> Mission:

@@ -47,11 +47,20 @@ def read_toml(
     except UnicodeDecodeError as fault:
         raise error(f"{path}: not UTF-8 text (byte {fault.start}); save it as UTF-8") from fault
     except tomllib.TOMLDecodeError as fault:
-        raise error(f"{path}: not valid TOML: {' '.join(str(fault).split())}{end}") from fault
+        hint = _decimal_comma(data.decode("utf-8-sig"), str(fault))
+        raise error(f"{path}: not valid TOML: {' '.join(str(fault).split())}{hint}{end}") from fault
     except RecursionError as fault:
         raise error(f"{path}: not valid TOML: nested too deeply{end}") from fault
     except ValueError as fault:  # a number of thousands of digits
         raise error(f"{path}: not valid TOML: {str(fault)[:80]}{end}") from fault
+
+
+def _decimal_comma(text: str, fault: str) -> str:
+    """What to add where the line has a number with a comma; empty elsewhere."""
+    line, lines = re.search(r"at line (\d+)", fault), text.splitlines()
+    place = int(line[1]) - 1 if line else len(lines)
+    found = re.search(r"=\s*([+-]?\d+),(\d+)\s*(#.*)?$", lines[place]) if place < len(lines) else None
+    return f"; write {found[1]}.{found[2]} with a point, not with a comma" if found else ""
 
 
 def read_table(path: Path, model: type[Model], error: type[Exception], remedy: str = "") -> Model:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from companion.core.clock import processor_s
+from companion.core.interrupts import is_interrupt
 from companion.executive.mission_progress import TargetStatus
 from companion.mission.load import load_mission
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
@@ -64,7 +65,7 @@ def drive(spec: RunSpec, folder: Path) -> RunResult:
     except NoWayError as error:
         return RunResult("", NO_GROUND, cpu_s=processor_s() - began_s, said=str(error)[:300])
     except Exception as error:
-        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+        if is_interrupt(error):
             raise KeyboardInterrupt from None  # within a compiled loop
         text = " ".join(f"{type(error).__name__}: {error}".split())
         return RunResult("", ERROR, cpu_s=processor_s() - began_s, said=text[:300])

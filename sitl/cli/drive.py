@@ -13,7 +13,7 @@ from rich.console import Console
 from companion.app import Status
 from companion.cli.entry import StoppedError
 from companion.cli.given import RadiusM, SpeedMS
-from companion.cli.inputs import EXIT_BAD_INPUT, Laps, OutputError, SkipUnknown, usable_settings
+from companion.cli.inputs import EXIT_BAD_INPUT, EXIT_NOT_WRITTEN, Laps, OutputError, SkipUnknown, usable_settings
 from companion.cli.source import warn_of_places, warning
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
@@ -31,7 +31,7 @@ from companion.viewer.live_viewer import LiveViewer
 from companion.viewer.terminal.painter import Painter, ViewError, terminal
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_turning_on_the_spot
-from sitl.cli.drive_outputs import outputs, print_summary, write_collisions
+from sitl.cli.drive_outputs import Outputs, outputs, print_summary, write_collisions
 from sitl.cli.drive_progress import Also, Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
 from sitl.faults.fault_file import FaultFileError
@@ -84,8 +84,8 @@ def drive(
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
-    4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person ends after a minute,
-    one that cannot begin after five.
+    4: collision; 2: bad input; 5: as 0, but a file could not be written; 130: stopped by Ctrl-C or
+    SIGTERM. A run that waits for a person ends after a minute, one that cannot begin after five.
     """
     painter: Painter | None = None
     console, wanted = Console(), outputs(image, map_stem, json_file, report_file, record)
@@ -141,11 +141,18 @@ def drive(
     recorder.close()
     _print_results(report, console, mission, settings)
     _print_last(painter, wanted.lines + isinstance(recorder, Recorder))
+    unwritten = _written(wanted, run, recorder, console)
+    raise typer.Exit(report.exit_code or unwritten)
+
+
+def _written(wanted: Outputs, run: Drive, recorder: Recorder | NullRecorder, console: Console) -> int:
+    """What was asked for is written; the exit code if something could not be."""
     try:
         wanted.write(run, recorder, console)
     except OutputError as error:
-        raise _refused(error) from error
-    raise typer.Exit(report.exit_code)
+        _warn(str(error))
+        return EXIT_NOT_WRITTEN
+    return 0
 
 
 def _simulated_lidar(text: str) -> LidarSpec:

@@ -1,5 +1,6 @@
 """How the scripts begin and end: wrong usage and an interrupt during the imports."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -95,7 +96,9 @@ def test_an_interrupt_inside_a_compiled_loop_ends_a_command_like_any_other(capsy
 
     @app.command()
     def interrupted() -> None:
-        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+        first = SystemError("returned a result with an exception set")
+        first.__cause__ = KeyboardInterrupt()
+        raise SystemError("a loop that called the first one") from first
 
     @app.command()
     def broken() -> None:
@@ -131,3 +134,12 @@ def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
         errors.endswith(f"record so far: {record}; rover-companion report {record} shows it\n")
         and (record / "link.tlog").stat().st_size > 0
     )
+
+
+@pytest.mark.parametrize(("name", "words"), [("rover-companion", "--from-autopilot"), ("rover-sitl", "--time-limit-s")])
+def test_on_a_narrow_terminal_no_option_is_cut(name: str, words: str) -> None:
+    which = "run" if name == "rover-companion" else "drive"
+    narrow = {**os.environ, "COLUMNS": "60"}
+    done = subprocess.run(command(name, which, "--help"), capture_output=True, text=True, env=narrow, check=True)
+    assert words in done.stdout and "…" not in done.stdout
+    assert max(map(len, done.stdout.splitlines())) <= 60

@@ -49,3 +49,21 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, words):
     result = CliRunner().invoke(app, ["bench", "--no-peers", *arguments])
     assert result.exit_code == 2
     assert words in result.output and result.output.count("\n") == 1
+
+
+def test_two_ends_do_where_there_is_no_scenario_file(tmp_path):
+    (tmp_path / "small.map").write_text("type octile\nheight 3\nwidth 5\nmap\n.....\n..@..\n.....\n")
+    figures = tmp_path / "b.json"
+    command = ["bench", str(tmp_path / "small.map"), "--sizes", "", "--planners", "astar", "--no-peers"]
+    result = CliRunner().invoke(app, [*command, "--start", "0,1", "--target", "4,1", "--json", str(figures)])
+    assert result.exit_code == 0, result.output
+    (entry,) = json.loads(figures.read_text())["entries"]
+    assert entry["contestant"] == "astar"
+    for more, words in (
+        ([], "give --start and --target, or a MovingAI scenario file beside it (small.map.scen)"),
+        (["--start", "0,1"], "--start and --target go together"),
+        (["--start", "2,1", "--target", "4,1"], "on an obstacle, choose a free field"),
+        (["--start", "0,9", "--target", "4,1"], "outside the map, which has fields 0,0 to 4,2"),
+    ):
+        refused = CliRunner().invoke(app, [*command, *more])
+        assert refused.exit_code == 2 and words in refused.output, refused.output

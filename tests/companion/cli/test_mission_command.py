@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
@@ -177,3 +178,32 @@ def test_what_drive_would_refuse_is_refused_here_too(tmp_path: Path) -> None:
     path.write_text('[[target]]\nnorth_m = 3\neast_m = 0\n[sitl]\nworld = "w.toml"\n')
     (tmp_path / "w.toml").write_text("size_m = [20.0, 16.0]\n")
     assert "sitl.start: missing; give the field of " in refused(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            "size_m = [40, 20]\n[[obstacle]]\ncircle_m = [3, 4, 1]\n",
+            "describes a world of the simulator, and no mission",
+        ),
+        ("[[target]]\nnorth_m = 18,0\neast_m = 1\n", "write 18.0 with a point, not with a comma"),
+        (
+            '[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.toml"\nstart = [200, 10]\n',
+            "lies outside the world",
+        ),
+        ('[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.png"\nstart = [30, 3]\n', "lies outside the world"),
+    ],
+    ids=["a world file", "a decimal comma", "a start outside a world file", "a start outside a picture"],
+)
+def test_mistakes_that_people_make_are_named(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "w.toml").write_text("size_m = [40, 20]\n")
+    Image.new("L", (30, 20), 255).save(tmp_path / "w.png")
+    path = tmp_path / "m.toml"
+    path.write_text(text)
+    result = CliRunner().invoke(app, ["mission", "check", str(path)])
+    assert (result.exit_code, result.output.count("\n")) == (2, 1), result.output
+    assert says in result.output and result.output.startswith(str(path))
+    inside = path.with_name("inside.toml")
+    inside.write_text(text.replace("200", "20").replace("30, 3", "29, 3").replace("18,0", "18.0"))
+    assert CliRunner().invoke(app, ["mission", "check", str(inside)]).exit_code == (2 if "size_m" in text else 0)

@@ -34,7 +34,7 @@ NOBODY = ("--connect", "tcp:127.0.0.1:9")
 PLAN = ("--start", "0,0", "--target", "1,1")
 ROOT = Path(__file__).resolve().parents[3]
 FREE = str(ROOT / "missions" / "maps" / "one-obstacle.png")
-REASONS = ("not a file", "no grids", "a MovingAI scenario file is needed")
+REASONS = ("not a file", "no grids", "a MovingAI scenario file beside it")
 """Where any file is looked for, a pipe is none."""
 RUN = ("run", "yard.toml", *NOBODY)
 ROS = "image: {pipe}\nresolution: 1.0\norigin: [0, 0, 0]\n"
