@@ -55,7 +55,7 @@ class ViewerFeed:
         self._frame_s = self._tiles_s = self._scene_s = -math.inf
         self._news: list[Json] = []
         self._rates = Arrivals()
-        self.touched: Sequence[Sequence[float]] = ()
+        self.touched: Sequence[Sequence[float]] | None = None
         """Where a simulated rover touched something, north and east; whoever knows it writes it here."""
 
     def warn(self, text: str) -> None:
@@ -130,7 +130,8 @@ class ViewerFeed:
         frame = frame_of(self._companion, status)
         frame["news"] = self._news
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
-        frame["contacts"], frame["touched"] = len(self.touched), list(self.touched[-TOUCHED_KEPT:])
+        frame["contacts"] = None if self.touched is None else len(self.touched)
+        frame["touched"] = list((self.touched or ())[-TOUCHED_KEPT:])
         return frame
 
     def _put(self, message: Json) -> bool:

@@ -52,8 +52,11 @@ class LiveViewer:
         if self._feed is not None:
             self._feed.warn(text)
 
-    def show(self, status: Status, touched: Sequence[Sequence[float]] = ()) -> None:
-        """To be called after each tick. ``touched``: where a simulated rover touched something, north and east."""
+    def show(self, status: Status, touched: Sequence[Sequence[float]] | None = None) -> None:
+        """To be called after each tick. ``touched``: where a simulated rover touched something, north and east.
+
+        None: nobody knows, as on a real rover.
+        """
         try:
             self._pass_on()
         except Exception as error:  # nor is what somebody asks for
@@ -74,7 +77,10 @@ class LiveViewer:
         if self._requests is None or self._companion is None:
             return
         for one in asked:
-            self._requests.take(one, self._companion)
+            try:
+                self._requests.take(one, self._companion)
+            except (ValueError, TypeError, KeyError, OverflowError) as error:  # the next one is heard all the same
+                self._say(f"a request of the page is no use: {type(error).__name__}: {error}")
         for answer in self._requests.answered(self._companion):
             self.web.put(wire.JSON, json.dumps(answer).encode())
 

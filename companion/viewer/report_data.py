@@ -80,9 +80,9 @@ def joined(record: Record, watched: ReportWatch, run: Run, others: list[Run]) ->
         }
         for one in _contacts(record.directory)
     ]
-    for frame in watched.frames:
-        frame["contacts"] = sum(one["t"] <= frame["t"] for one in contacts)
     clock = record_clock(record)
+    for frame in watched.frames if clock.simulated else ():
+        frame["contacts"] = sum(one["t"] <= frame["t"] for one in contacts)
     scene = {
         "live": False,
         "cut": not record.complete,

@@ -48,6 +48,9 @@ ACTIONS_A_SECOND = 5
 WRONG_TOKEN_S = 0.5
 LAST_S = 0.4
 """So long browsers have to be told the last moment."""
+LONGEST_S = 1e9
+"""Of a time that a page tells."""
+FARTHEST_M = 1e7
 ACTIONS = ("pause", "resume", "goto", "skip")
 HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -176,13 +179,11 @@ class WebApp:
             return "not allowed"
         if asked.get("kind") != "act" or asked.get("action") not in ACTIONS:
             return "unknown request"
-        if not isinstance(asked.get("t"), int | float):
+        if not _is_number(asked.get("t"), LONGEST_S):
             return "no time"
         place = asked.get("place")
         if asked["action"] == "goto" and not (
-            isinstance(place, list)
-            and len(place) == 2
-            and all(isinstance(one, int | float) and abs(one) < 1e7 for one in place)
+            isinstance(place, list) and len(place) == 2 and all(_is_number(one, FARTHEST_M) for one in place)
         ):
             return "no place"
         return ""
@@ -218,6 +219,11 @@ class _Files(StaticFiles):
         response = await super().get_response(path, scope)
         response.headers.update(HEADERS)
         return response
+
+
+def _is_number(value: object, most: float) -> bool:
+    """Whether it is a number within bounds; an integer of hundreds of digits is no float."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and -most < value < most
 
 
 def _policy(index: str) -> str:

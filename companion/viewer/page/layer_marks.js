@@ -22,7 +22,6 @@ export function drawMarks(pen, scene, frame) {
     ? targets.findIndex((target) => target.name === goal.name && distance(target.place, goal.place) < 0.5)
     : -1;
   targets.forEach((target) => takeRoom(pen, target));
-  if (current >= 0) drawRadius(pen, targets[current]);
   if (goal) drawGoal(pen, goal, current >= 0 ? String(current + 1) : "");
   if (scene.home) drawHome(pen, scene.home);
   targets.forEach((target, i) => {
@@ -35,12 +34,6 @@ function takeRoom(pen, target) {
   const [x, y] = pen.camera.toScreen(...target.place);
   const half = RADIUS + 2;
   pen.taken.push([x - half, y - half, 2 * half, 2 * half]);
-}
-
-function drawRadius(pen, target) {
-  const [x, y] = pen.camera.toScreen(...target.place);
-  const radius = target.radius_m * pen.camera.scale;
-  if (radius > RADIUS + 3) pen.disc(x, y, radius, null, pen.colours.goal, 1.5);
 }
 
 function drawGoal(pen, goal, sign) {

@@ -149,8 +149,13 @@ def test_without_a_token_nobody_may_act(web: WebProcess) -> None:
 
 
 @pytest.mark.parametrize(
-    "garbage", ["", "null", "[]", "{", "[" * 1500, '{"kind": "act"}', '{"kind":"act","action":"goto","place":[NaN,1]}']
-)
+    "garbage",
+    [
+        "", "null", "[]", "{", "[" * 1500, '{"kind": "act"}', '{"kind":"act","action":"goto","place":[NaN,1]}',
+        '{"kind":"act","action":"pause","goal":"","t":1' + "0" * 400 + "}",
+        '{"kind":"act","action":"goto","goal":"","t":1,"place":[1' + "0" * 400 + ",1]}",
+    ],
+)  # fmt: skip
 def test_garbage_is_answered_or_passed_over(with_token: WebProcess, garbage: str) -> None:
     with looking(with_token, TOKEN) as client:
         next_of(client, "scene")
