@@ -24,6 +24,7 @@ from companion.recording.reader import Record
 from companion.recording.record_clock import record_clock
 from companion.replay.explain import Candidate, DecisionExplainer, Explanation, explanation_lines
 from companion.replay.replay import Observers, ReplayObserver, ReplayResult, replay
+from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of
 from companion.viewer.map_tiles import TileWatch
 from companion.viewer.report_tables import Run, differences, tables_of
@@ -126,6 +127,7 @@ class ReportWatch(ReplayObserver):
         turning_radius_m = record.mission.rover.turning_radius_m
         self._explainer = DecisionExplainer(None, record.settings, turning_radius_m, self._explained)
         self._before: Json = {}
+        self._rates = Arrivals()
         self._news: list[Json] = []
         self._frame_s = self._path_s = self._tiles_s = -math.inf
         self._watch: TileWatch | None = None
@@ -147,6 +149,7 @@ class ReportWatch(ReplayObserver):
     def ticked(self, companion: Companion, time_s: float) -> None:
         """See ``ReplayObserver``."""
         status = companion.status()
+        self._rates.note(companion.vehicle)
         self.began_s = status.time_s - time_s
         self._news += [{**one, "t": round(time_s, 2)} for one in news_of(status)]
         if time_s - self._frame_s < FRAME_S - 1e-6 and not companion.done:
@@ -155,7 +158,8 @@ class ReportWatch(ReplayObserver):
         if self._start is None and status.pose is not None:
             self._start = status.pose.north_m, status.pose.east_m
         frame = frame_of(companion, status)
-        frame.update({"t": round(time_s, 2), "news": self._news, "rates": {}})
+        frame.update({"t": round(time_s, 2), "news": self._news})
+        frame["rates"] = self._rates.at(companion.vehicle, status.time_s)
         frame["figures"].update(tick_ms=None, planning_ms=None)  # of the replay, not of the run
         if time_s - self._path_s < PATH_S and frame["path"] and self._before.get("path"):
             frame["path"] = self._before["path"]

@@ -26,6 +26,7 @@ from companion.viewer.film_picture import REACHED, ROVER, TRACK
 from companion.viewer.report_data import counted
 from companion.viewer.report_tables import tables_of
 from tests.support.records import START_US, recorded, write_record
+from tests.support.reports import report_data_in
 from tests.support.rig import yard
 
 
@@ -94,6 +95,14 @@ def test_tables_have_every_decision_pose_and_setpoint(record: Path, made: Path) 
     told = [raw for raw in said if raw[7:10] == bytes((84, 0, 0))]  # SET_POSITION_TARGET_LOCAL_NED
     assert sum(row["kind"] != "speed" for row in setpoints) == len(told) > 10
     assert {row["kind"] for row in setpoints} >= {"position", "speed", "velocity"}
+
+
+def test_the_page_of_a_report_knows_how_often_data_came(made: Path) -> None:
+    frames = report_data_in(made / "r.html")["frames"]
+    rates = [frame["rates"] for frame in frames if "rates" in frame]
+    middle = rates[len(rates) // 2]
+    assert 5.0 < middle["position"] < 25.0 and 5.0 < middle["range"] < 25.0
+    assert middle["heartbeat_age_s"] < 1.5 and middle["position_age_s"] < 0.3
 
 
 REQUIRED = {
