@@ -147,7 +147,7 @@ def run(
                 raise SystemExit(EXIT_STOPPED)
             mission = refuse_arming(with_laps(mission, laps), arm=arm)
             # The link first: with a wrong one nothing is written.
-            link, keeping = _opened(source, say), RunState(mission, state, resume=resume, say=say)
+            link, keeping = _opened(source, say, ends), RunState(mission, state, resume=resume, say=say)
             ends.callback(keeping.close)
             if keeping.ended:
                 raise typer.Exit(_print_statuses(keeping.statuses))
@@ -214,9 +214,10 @@ def _told_place(recorder: Recorder | NullRecorder, asked: Path | None, say: Call
     return place
 
 
-def _opened(source: Source, say: Callable[[str], None]) -> ByteLink:
-    """The link; names the other programs that have the same serial port open. Raises LinkError."""
+def _opened(source: Source, say: Callable[[str], None], ends: contextlib.ExitStack) -> ByteLink:
+    """The link, closed in the end; names the other programs that have the same serial port open. Raises LinkError."""
     link = source.link()
+    ends.callback(link.close)
     for user in rivals_of(link):
         say(f"{link.description}: {user} has this port open too, and takes bytes away; see docs/ports.md")
     return link
