@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import re
 from copy import deepcopy
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -32,6 +33,17 @@ class CampaignError(Exception):
     """A campaign that cannot be driven; the text is one line with file, place and remedy."""
 
 
+class SearchPart(StrEnum):
+    """What a search may move."""
+
+    WORLD = "world"
+    TRAFFIC = "traffic"
+    ROVER = "rover"
+    SENSORS = "sensors"
+    FAULTS = "faults"
+    SETTINGS = "settings"
+
+
 class SearchTable(BaseModel):
     """``[search]``: what ``--search`` moves.
 
@@ -41,8 +53,8 @@ class SearchTable(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    parts: list[Literal["world", "traffic", "rover", "sensors", "faults", "settings"]] = Field(
-        default=["world", "rover", "sensors", "faults", "settings"], min_length=1
+    parts: list[Annotated[SearchPart, Field(strict=False)]] = Field(
+        default=[one for one in SearchPart if one is not SearchPart.TRAFFIC], min_length=1
     )
     settings: dict[str, Annotated[tuple[float, float], Field(strict=False)]] = Field(default_factory=dict)
 

@@ -19,8 +19,11 @@ AUTOPILOT = 1
 HEARTBEAT = 0
 RANGES = (132, 330, 11037)
 """DISTANCE_SENSOR, OBSTACLE_DISTANCE, OBSTACLE_DISTANCE_3D."""
-SETPOINTS = (84, 86)
-"""SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT."""
+SETPOINTS = (84, 86, 73)
+"""SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT, MISSION_ITEM_INT."""
+COMMAND_INT, REPOSITION = 75, 192
+COMMAND_AT = slice(38, 40)
+"""The bytes of a COMMAND_INT with the command's number."""
 STOPPING_S = 4.0
 """From the moment at which range data counts as stale: a tick, the line, and braking from 2 m/s."""
 ALIVE_S = 0.5
@@ -48,7 +51,7 @@ class WireWatch:
     def _said(self, time_s: float, data: bytes) -> None:
         """``data``: of the companion."""
         if not self._may_send:
-            self.against_pilot += sum(kind in SETPOINTS for kind, _ in _packets(data))
+            self.against_pilot += sum(_is_setpoint(kind, packet) for kind, packet in _packets(data))
 
     def _heard(self, time_s: float, data: bytes) -> None:
         """``data``: delivered to the companion."""
@@ -76,6 +79,12 @@ class WireWatch:
             and self._may_send
             and abs(self._run.simulator.truth.speed_m_s) > MOVES_M_S
         )
+
+
+def _is_setpoint(kind: int, packet: bytes) -> bool:
+    """In every form that ``link.setpoint`` may choose."""
+    command = int.from_bytes(packet[COMMAND_AT], "little") if kind == COMMAND_INT else 0
+    return kind in SETPOINTS or command == REPOSITION
 
 
 def _packets(data: bytes) -> Iterator[tuple[int, bytes]]:

@@ -9,16 +9,15 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from typing import Any
 
 from annotated_types import Ge, Le
 
 from companion.settings import Settings
 from companion.settings.tunable_parameters import TABLE
-from sitl.campaign.campaign_file import CampaignTable
+from sitl.campaign.campaign_file import CampaignTable, SearchPart
 from sitl.campaign.run_spec import RunSpec
-from sitl.campaign.worded import BETWEEN_FAULTS, NOTHING, GroundSpec, Worded
+from sitl.campaign.worded import BETWEEN_FAULTS, NOTHING, GroundSpec, SensorSpec, Worded
 from sitl.generators.kinds import KINDS
 
 Values = Mapping[str, float]
@@ -32,22 +31,11 @@ WORLD_FACTOR = 2.0
 """So far a parameter of the ground may be from the usual."""
 
 
-class Part(StrEnum):
-    """What a gene belongs to."""
-
-    WORLD = "world"
-    TRAFFIC = "traffic"
-    ROVER = "rover"
-    SENSORS = "sensors"
-    FAULTS = "faults"
-    SETTINGS = "settings"
-
-
 @dataclass(frozen=True, slots=True)
 class Gene:
     """One figure. ``usual``: what it is without a word."""
 
-    part: Part
+    part: SearchPart
     name: str
     low: float
     high: float
@@ -77,14 +65,14 @@ class Gene:
         return self.low > 0.0 and self.high > DECADE * self.low
 
 
-ROVER = (Gene(Part.ROVER, "off_model", 0.0, 0.3, 0.0), Gene(Part.ROVER, "late_s", 0.0, 0.2, 0.0))
+ROVER = (Gene(SearchPart.ROVER, "off_model", 0.0, 0.3, 0.0), Gene(SearchPart.ROVER, "late_s", 0.0, 0.2, 0.0))
 """As far off its model and as late as the rover must bear (docs/guidance.md)."""
 SENSORS = (
-    Gene(Part.SENSORS, "noise_m", 0.0, 0.1, 0.02),
-    Gene(Part.SENSORS, "dropout", 0.0, 0.3, 0.0),
-    Gene(Part.SENSORS, "false_echo", 0.0, 0.005, 0.0),
-    Gene(Part.SENSORS, "latency_s", 0.0, 0.2, 0.0),
-    Gene(Part.SENSORS, "max_m", 3.0, 12.0, 8.0),
+    Gene(SearchPart.SENSORS, "noise_m", 0.0, 0.1, 0.02),
+    Gene(SearchPart.SENSORS, "dropout", 0.0, 0.3, 0.0),
+    Gene(SearchPart.SENSORS, "false_echo", 0.0, 0.005, 0.0),
+    Gene(SearchPart.SENSORS, "latency_s", 0.0, 0.2, 0.0),
+    Gene(SearchPart.SENSORS, "max_m", 3.0, 12.0, 8.0),
 )
 FAULTS: dict[str, dict[str, tuple[float, float]]] = {
     "link_outage": {"start_s": (0.0, 60.0), "duration_s": (0.1, 3.0)},
@@ -100,34 +88,34 @@ HARM = {"link_outage": "duration_s", "sensor_silent": "duration_s", "wheel_slip"
 def genes_of(campaign: CampaignTable, base: RunSpec) -> tuple[Gene, ...]:
     """All that a search on this run may move: of the parts that the campaign's ``[search]`` names."""
     groups = {
-        Part.WORLD: _of_ground(base.world),
-        Part.TRAFFIC: _of_traffic(base.world),
-        Part.ROVER: ROVER,
-        Part.SENSORS: SENSORS,
-        Part.FAULTS: _of_faults(),
-        Part.SETTINGS: _of_settings(campaign, base),
+        SearchPart.WORLD: _of_ground(base.world),
+        SearchPart.TRAFFIC: _of_traffic(base.world),
+        SearchPart.ROVER: tuple(replace(gene, usual=getattr(base, gene.name)) for gene in ROVER),
+        SearchPart.SENSORS: _of_sensors(base.sensors),
+        SearchPart.FAULTS: _of_faults(),
+        SearchPart.SETTINGS: _of_settings(campaign, base),
     }
-    return tuple(gene for part in campaign.search.parts for gene in groups[Part(part)])
+    return tuple(gene for part in campaign.search.parts for gene in groups[part])
 
 
 def spec_with(base: RunSpec, genes: Sequence[Gene], values: Values) -> RunSpec:
     """The run with these values of genes; those that have none are as in ``base``."""
     of = {part: {gene.name: values[gene.name] for gene in genes if gene.part == part and gene.name in values}
-          for part in Part}  # fmt: skip
+          for part in SearchPart}  # fmt: skip
     changes = json.loads(base.changes)
-    for name, value in of[Part.SETTINGS].items():
+    for name, value in of[SearchPart.SETTINGS].items():
         section, _, key = name.partition(".")
         changes.setdefault(section, {})[key] = value
-    faults = _faults_in_words(base.faults, of[Part.FAULTS])
+    faults = _faults_in_words(base.faults, of[SearchPart.FAULTS])
     return replace(
         base,
-        world=_more(base.world, {**of[Part.WORLD], **of[Part.TRAFFIC]}),
-        sensors=_more(base.sensors, of[Part.SENSORS]),
+        world=_more(base.world, {**of[SearchPart.WORLD], **of[SearchPart.TRAFFIC]}),
+        sensors=_more(base.sensors, of[SearchPart.SENSORS]),
         faults=faults,
-        off_model=of[Part.ROVER].get("off_model", base.off_model),
-        late_s=of[Part.ROVER].get("late_s", base.late_s),
+        off_model=of[SearchPart.ROVER].get("off_model", base.off_model),
+        late_s=of[SearchPart.ROVER].get("late_s", base.late_s),
         changes=json.dumps(changes, sort_keys=True),
-        settings="found" if of[Part.SETTINGS] else base.settings,
+        settings="found" if of[SearchPart.SETTINGS] else base.settings,
     )
 
 
@@ -142,18 +130,23 @@ def _of_ground(world: str) -> tuple[Gene, ...]:
         usual = float(getattr(ground.given, name))
         if usual > 0.0:  # far from the usual most grounds have no way
             low, high = max(low, usual / WORLD_FACTOR), min(high, usual * WORLD_FACTOR)
-        genes.append(Gene(Part.WORLD, name, low, high, usual, whole=field.annotation is int))
+        genes.append(Gene(SearchPart.WORLD, name, low, high, usual, whole=field.annotation is int))
     return tuple(genes)
 
 
 def _of_traffic(world: str) -> tuple[Gene, ...]:
     ground = GroundSpec.of(world)
-    return () if ground is None else (Gene(Part.TRAFFIC, "movers", 0, MOST_MOVERS, ground.movers, whole=True),)
+    return () if ground is None else (Gene(SearchPart.TRAFFIC, "movers", 0, MOST_MOVERS, ground.movers, whole=True),)
+
+
+def _of_sensors(sensors: str) -> tuple[Gene, ...]:
+    given = SensorSpec.of(sensors).changes.model_dump(exclude_none=True)
+    return tuple(replace(gene, usual=given.get(gene.name, gene.usual)) for gene in SENSORS)
 
 
 def _of_faults() -> tuple[Gene, ...]:
     return tuple(
-        Gene(Part.FAULTS, f"{kind}.{key}", low, high, low)
+        Gene(SearchPart.FAULTS, f"{kind}.{key}", low, high, low)
         for kind, keys in FAULTS.items()
         for key, (low, high) in keys.items()
     )
@@ -169,7 +162,7 @@ def _of_settings(campaign: CampaignTable, base: RunSpec) -> tuple[Gene, ...]:
     for name, (low, high, whole) in bounds.items():
         section, _, key = name.partition(".")
         usual = float(changes.get(section, {}).get(key, _setting(settings, name)))
-        genes.append(Gene(Part.SETTINGS, name, low, high, usual, whole))
+        genes.append(Gene(SearchPart.SETTINGS, name, low, high, usual, whole))
     return tuple(genes)
 
 

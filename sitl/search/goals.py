@@ -37,6 +37,9 @@ POLICIES = {
     Goal.UNREACHABLE: Policy.NO_FALSE_UNREACHABLE,
     Goal.REFUSED: Policy.NOTHING_REFUSED,
 }
+"""Goals that are the breaking of a policy."""
+TOLD_TWICE = {**POLICIES, Goal.STUCK: Policy.ENDS}
+"""The policy that a run breaks, too, when it shows a goal."""
 
 
 def shows(goal: Goal, result: RunResult) -> bool:

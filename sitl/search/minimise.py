@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sitl.search.genes import Part
+from sitl.campaign.campaign_file import SearchPart
 from sitl.search.search import Driven, Find
 
 
 def minimised(find: Find, drive: Driven) -> Find:
     """The same find with as few values as it needs; it is driven again for each try."""
-    parts = [[gene.name for gene in find.genes if gene.part == part] for part in Part]
+    parts = [[gene.name for gene in find.genes if gene.part == part] for part in SearchPart]
     for names in [*parts, *([gene.name] for gene in find.genes)]:
         find = _without(find, names, drive)
     return find

@@ -22,7 +22,7 @@ from sitl.campaign.policies import ERROR, Policy, broken
 from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
 from sitl.campaign.worded import GroundSpec
 from sitl.search.genes import Gene, Values, genes_of, spec_with
-from sitl.search.goals import Goal, distance, shows
+from sitl.search.goals import TOLD_TWICE, Goal, distance, shows
 
 GENERATIONS = 8
 SPREAD = 0.25
@@ -104,12 +104,8 @@ def _one_start(
 def _finds(goal: Goal, base: RunSpec, genes: tuple[Gene, ...], values: Values, result: RunResult) -> list[Find]:
     """By what a run has done: the goal of the search, and all policies that it breaks."""
     rules: list[Goal | Policy] = [goal] if shows(goal, result) else []
-    rules += [policy for policy in broken(result) if policy.value != goal.value and not _is_same(goal, policy)]
+    rules += [policy for policy in broken(result) if policy is not TOLD_TWICE.get(goal)]
     return [Find(rule, base, genes, values, result) for rule in rules]
-
-
-def _is_same(goal: Goal, policy: Policy) -> bool:
-    return (goal, policy) in ((Goal.COLLISION, Policy.NO_CONTACT), (Goal.STUCK, Policy.ENDS))
 
 
 def _distance(goal: Goal, result: RunResult | None) -> float:

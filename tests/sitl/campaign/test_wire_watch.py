@@ -80,3 +80,23 @@ def test_a_rover_that_moves_without_range_data_is_seen(
         messages = [beat] if beats or time_s <= 2.0 else []
         heard_by(watch, time_s, *messages, *([ranges] if 0.0 < time_s <= 1.0 else []))
     assert watch.blind_s == pytest.approx(blind_s, abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("message", "counts"),
+    [
+        (mavlink.MAVLink_set_position_target_global_int_message(0, 1, 1, 6, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0), 1),
+        (mavlink.MAVLink_mission_item_int_message(1, 1, 0, 6, 16, 2, 1, 0, 0, 0, 0, 0, 0, 0), 1),
+        (mavlink.MAVLink_command_int_message(1, 1, 6, 192, 0, 0, 0, 0, 0, 0, 0, 0, 0), 1),
+        (mavlink.MAVLink_command_int_message(1, 1, 6, 195, 0, 0, 0, 0, 0, 0, 0, 0, 0), 0),
+        (mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3), 0),
+    ],
+    ids=["global", "mission item", "reposition", "another command", "heartbeat"],
+)
+def test_every_form_of_setpoint_counts(message: mavlink.MAVLink_message, counts: int) -> None:
+    run = SimpleNamespace(clock=SimpleNamespace(overhear=None, delivered=None), settings=Settings(), simulator=None)
+    watch = WireWatch(run)  # type: ignore[arg-type]
+    heard_by(watch, 1.0, mavlink.MAVLink_heartbeat_message(10, 3, 129, 0, 4, 3))
+    assert run.clock.overhear is not None
+    run.clock.overhear(1.05, message.pack(mavlink.MAVLink(None, 1, 191)))
+    assert watch.against_pilot == counts

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from companion.settings import Settings
 from companion.settings.tunable_parameters import TABLE
-from sitl.campaign.campaign_file import CampaignTable, SearchTable
+from sitl.campaign.campaign_file import CampaignTable, SearchPart, SearchTable
 from sitl.campaign.drive_run import settings_of
 from sitl.campaign.run_spec import RunSpec, specs_of
 from sitl.campaign.worded import GroundSpec, SensorSpec, faults_of
-from sitl.search.genes import ROVER, SENSORS, Gene, Part, genes_of, spec_with
+from sitl.search.genes import ROVER, SENSORS, Gene, genes_of, spec_with
 
 CAMPAIGN = CampaignTable(
     worlds=["cylinders movers=1"],
@@ -39,7 +39,7 @@ def test_whatever_the_share_the_value_is_within_the_bounds(gene: Gene, share: fl
 
 
 def test_every_tunable_setting_may_move_within_its_bounds_and_the_campaigns_own_too() -> None:
-    genes = {gene.name: gene for gene in genes_of(CAMPAIGN, base()) if gene.part == Part.SETTINGS}
+    genes = {gene.name: gene for gene in genes_of(CAMPAIGN, base()) if gene.part == SearchPart.SETTINGS}
     assert {f"{one.section}.{one.key}" for one in TABLE} | {"guidance.look_ahead_m"} == set(genes)
     assert (genes["guidance.look_ahead_m"].low, genes["guidance.look_ahead_m"].high) == (0.3, 2.0)
     assert (genes["navigator.better_every_fields"].low, genes["navigator.better_every_fields"].whole) == (2, True)
@@ -62,6 +62,12 @@ def test_values_make_a_run_that_says_them_in_words() -> None:
     assert json.loads(spec.changes) == {"guidance": {"clearance_m": 0.05}}
     assert settings_of(spec).guidance.clearance_m == 0.05
     assert spec_with(base(), genes, {}) == base(), "as usual: the same run"
+
+
+def test_what_the_campaign_says_is_the_usual() -> None:
+    table = CAMPAIGN.model_copy(update={"off_model": [0.3], "sensors": ["lidar-360 dropout=0.1"]})
+    genes = {gene.name: gene for gene in genes_of(table, next(specs_of(table)))}
+    assert (genes["off_model"].usual, genes["late_s"].usual, genes["dropout"].usual) == (0.3, 0.0, 0.1)
 
 
 def test_a_fault_without_what_makes_it_one_is_none() -> None:
