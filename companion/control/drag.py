@@ -4,6 +4,9 @@ Such a rover is held by the ground: gravel, grass, a slope. ArduRover opens the 
 is told, and closes it slowly, also when it is told to stop. Where such ground ends the rover shoots ahead. So the more
 it is held, the more room its positions get and the sooner it brakes.
 
+A rover that such ground holds rolls on for seconds after it was told to stand, until the throttle is closed. Told to
+roll back, it closes it several times as fast.
+
 Nouns: drag watch.
 """
 
@@ -11,13 +14,21 @@ from __future__ import annotations
 
 import math
 
+from companion.control.controller import ControlCommand
 from companion.control.local_view import LocalView
+from companion.control.setpoint_check import fault_of
+from companion.mission.bounds import Bounds
+from companion.vehicle.commands import GuidedVelocity
 from companion.vehicle.events import ThrottleSeen
 
 SLACK_M_S = 0.3
 """A rover on firm ground is so much slower than its throttle says: it is read in whole per cent, and late."""
 FORGOTTEN_S = 0.5
 """What it was held by falls off with this time constant: the throttle is read ten times a second."""
+HELD_M_S = 0.2
+ROLLS_M_S = 0.1
+"""Below it ArduRover closes the throttle of a rover that is told to stand (ATC_STOP_SPEED as shipped)."""
+BACK_M_S = (1.0, 0.5, 0.25)
 STALE_S = 0.5
 """An older reading of the throttle says nothing."""
 
@@ -42,3 +53,18 @@ class DragWatch:
             held_m_s = max(throttle.share * full_m_s - view.speed_m_s - SLACK_M_S, 0.0)
         self._held_m_s = max(held_m_s, kept * self._held_m_s)
         return self._held_m_s
+
+
+def braked_harder(command: ControlCommand, view: LocalView, bounds: Bounds) -> ControlCommand:
+    """The command; or, where it tells a rover to stand that the ground holds and that rolls on, to roll back.
+
+    Only as fast as the rover may be left alone with.
+    """
+    stands = command.setpoint == GuidedVelocity(0.0, 0.0)
+    if not stands or view.held_m_s < HELD_M_S or view.forward_m_s < ROLLS_M_S:
+        return command
+    for speed_m_s in BACK_M_S:
+        back = GuidedVelocity(-speed_m_s, 0.0)
+        if fault_of(back, view, bounds) is None:
+            return ControlCommand(command.purpose, back, 0.0)
+    return command

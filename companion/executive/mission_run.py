@@ -13,7 +13,7 @@ from enum import Enum, auto
 import numpy as np
 
 from companion.control.controller import STANDSTILL, ControlCommand
-from companion.control.drag import DragWatch
+from companion.control.drag import DragWatch, braked_harder
 from companion.control.setpoint_check import SetpointCheck
 from companion.control.told import Told, after
 from companion.core.changed import changed
@@ -205,6 +205,7 @@ class MissionRun:
         executor.learn(view)
         wanted = executor.guide(task, view)
         wanted = self.legs.guide(wanted, executor, view)
+        wanted = braked_harder(wanted, view, executor.layout.bounds)
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)
 
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:

@@ -25,7 +25,7 @@ from sitl.lockstep import Drive
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
 from tests.support.mission_client import at, do, in_auto
 
-TIME_LIMIT_S = 80.0
+TIME_LIMIT_S = 65.0
 WAYPOINT, RETURN = 16, 20
 
 

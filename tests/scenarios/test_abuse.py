@@ -218,17 +218,17 @@ def test_a_thousand_messages_a_second_do_not_keep_it_from_its_mission(tmp_path: 
     began_s = rig.now_s()
     rig.garble = flooded
     tracemalloc.start()
-    rig.run_for(2.0)
+    rig.run_for(1.0)
     rig.sent.clear()
     first, _ = tracemalloc.get_traced_memory()
-    rig.run_for(4.0)
-    sent_hz = len(rig.sent) / 4.0
+    rig.run_for(2.0)
+    sent_hz = len(rig.sent) / 2.0
     rig.sent.clear()
     grown = tracemalloc.get_traced_memory()[0] - first
     tracemalloc.stop()
     rig.finish()
     assert rig.companion.outcome.complete and not rig.simulator.collisions, rig.texts()
-    assert before and count >= 6000 and rig.now_s() - began_s < 40.0
+    assert before and count >= 3000 and rig.now_s() - began_s < 40.0
     assert grown < 1_000_000
     assert sent_hz < 120.0, "it does not answer a flood with a flood"
     assert len(rig.texts()) - said < 200, rig.texts()

@@ -102,8 +102,10 @@ def assert_silent_since(rig: Asker, since_s: float) -> None:
     [
         (MANUAL, 2.2),  # setting off
         (HOLD, 6.0),  # at speed
-        (GUIDED, 6.0),
-        *(pytest.param(*one, marks=pytest.mark.thorough) for one in ((HOLD, 2.2), (GUIDED, 2.2), (MANUAL, 6.0))),
+        *(
+            pytest.param(*one, marks=pytest.mark.thorough)
+            for one in ((HOLD, 2.2), (GUIDED, 2.2), (MANUAL, 6.0), (GUIDED, 6.0))
+        ),
     ],
 )
 def test_a_person_who_takes_the_rover_in_a_leg_has_it(tmp_path: Path, mode: int, metres: float) -> None:

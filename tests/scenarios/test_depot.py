@@ -25,8 +25,8 @@ def driven(path: Path, sensors: str, seed: int = 0, limit_s: float = 300.0) -> D
 @pytest.mark.parametrize(
     "sensors",
     [
-        *(pytest.param(suite, marks=pytest.mark.thorough) for suite in ("lidar-90", "lidar-360")),
-        str(MISSIONS / "sensors" / "weathered.toml"),
+        pytest.param(suite, marks=pytest.mark.thorough)
+        for suite in ("lidar-90", "lidar-360", str(MISSIONS / "sensors" / "weathered.toml"))
     ],
 )
 def test_the_depot_is_driven_without_a_collision(sensors: str, tmp_path: Path) -> None:

@@ -101,7 +101,7 @@ OVERCOME: dict[str, tuple[Fault, ...]] = {
 
 OFTEN_SHOWN = ("out of order and twice", "outages", "lost and damaged", "late", "pilot", "gps for a moment")
 """Like what the shipped plans below do, and tests of a pilot; make test-all drives them too."""
-TOLD_ELSEWHERE = ("pilot stays", "blind")
+TOLD_ELSEWHERE = ("pilot stays", "blind", "gps false", "power")
 """By tests of safety; make test-all drives them here, too."""
 
 

@@ -214,7 +214,10 @@ def test_a_target_that_comes_to_lie_outside_while_nobody_listens_is_given_up_too
     assert max(east for _, east in rig.track) < 12.0 and rig.breaches == 0
 
 
-@pytest.mark.parametrize("when", ["before the requested goal", "during the requested goal"])
+@pytest.mark.parametrize(
+    "when",
+    [pytest.param("before the requested goal", marks=pytest.mark.thorough), "during the requested goal"],
+)
 def test_a_requested_goal_is_driven_though_the_target_after_it_is_refused(tmp_path: Path, when: str) -> None:
     target = '[[target]]\nname = "far"\nfield = [19, 7]\non_blocked = "wait"\n'
     prepare = stored(box(KEEP_IN, -6.0, -2.4, 7.0, 21.4), **POLYGONS, FENCE_MARGIN=0.0)

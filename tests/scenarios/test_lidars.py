@@ -52,7 +52,7 @@ def drive(
     "name",
     [
         "LD19",
-        "RPLIDAR-A1",
+        pytest.param("RPLIDAR-A1", marks=pytest.mark.thorough),
         pytest.param("YDLIDAR-X4", marks=pytest.mark.thorough),
         pytest.param("LD06", marks=pytest.mark.thorough),
         pytest.param("RPLIDAR-C1", marks=pytest.mark.thorough),

@@ -78,7 +78,7 @@ def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) 
     ("name", "faults", "limit_s"),
     [
         ("crossing.toml", "radio", 60.0),
-        ("ackermann.toml", "interrupted", 75.0),
+        pytest.param("ackermann.toml", "interrupted", 75.0, marks=pytest.mark.thorough),
         pytest.param("field.plan", "gps", 65.0, marks=pytest.mark.thorough),
         pytest.param("clutter.toml", "vehicle", 60.0, marks=pytest.mark.thorough),
     ],

@@ -421,7 +421,7 @@ def test_home_that_moves_leaves_the_mission_where_it_began(rig: Rig) -> None:
     assert [text for text in rig.texts() if "Home has moved" in text]
 
 
-@pytest.mark.parametrize("form", ["local", "global"])
+@pytest.mark.parametrize("form", ["local", pytest.param("global", marks=pytest.mark.thorough)])
 def test_an_autopilot_that_restarts_on_the_way(tmp_path: Path, form: str) -> None:
     """It comes back disarmed, in MANUAL, with another origin: the companion waits for a person."""
     rig = Rig(yard(tmp_path), parse_settings({"link": {"setpoint": form}}, "test"))

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from sitl.cli.commands import app
 
-RUNS = 3
+RUNS = 2
 
 
 def test_wang_table4(tmp_path):

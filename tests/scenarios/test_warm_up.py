@@ -11,7 +11,6 @@ CASES = [
     ("drive", "crossing.toml", "vertex++", "points", "64"),
     ("drive", "ackermann.toml", "hybrid", "motion-ga", "66"),  # led by points
     ("drive", "one-obstacle.toml", "hybrid", "motion-ga", "62"),
-    ("serve", "open.toml", "beams"),
     ("serve", "ackermann.toml", "lidar-360"),
 ]
 

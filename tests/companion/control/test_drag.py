@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from companion.control.drag import FORGOTTEN_S, SLACK_M_S, STALE_S, DragWatch
+from companion.control.controller import ControlCommand, Purpose
+from companion.control.drag import BACK_M_S, FORGOTTEN_S, SLACK_M_S, STALE_S, DragWatch, braked_harder
 from companion.control.local_view import MOST_FURTHER_M
 from companion.core.frames import Pose
+from companion.mission.bounds import Bounds
+from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.events import ThrottleSeen
 from companion.vehicle.motion_limits import full_throttle_m_s
-from tests.companion.control.test_safe_reach import SETTINGS, ground, view
+from tests.companion.control.test_safe_reach import HERE, SETTINGS, ground, put, view
 
 FULL_M_S = 4.0
 
@@ -59,3 +63,37 @@ def test_the_autopilot_tells_how_fast_it_goes_with_full_throttle() -> None:
 @pytest.mark.parametrize("known", [{}, {"CRUISE_SPEED": 1.0}, {"CRUISE_SPEED": 1.0, "CRUISE_THROTTLE": 0.0}])
 def test_or_it_is_as_shipped(known: dict[str, float]) -> None:
     assert full_throttle_m_s(known) == pytest.approx(4.0)
+
+
+STAND = ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, 0.0), 0.0)
+HELD = replace(view(ground(), HERE, 0.3), held_m_s=1.0)
+
+
+def test_a_rover_that_is_held_and_rolls_on_is_told_to_roll_back_until_it_stands() -> None:
+    back = braked_harder(STAND, HELD, Bounds())
+    assert back.purpose is Purpose.BRAKE
+    assert isinstance(back.setpoint, GuidedVelocity) and back.setpoint == GuidedVelocity(-BACK_M_S[0], 0.0)
+    for free in (replace(HELD, held_m_s=0.1), replace(HELD, speed_m_s=0.05), replace(HELD, rolls_back=True)):
+        assert braked_harder(STAND, free, Bounds()) == STAND
+
+
+def test_any_other_command_stays_as_it_is() -> None:
+    for setpoint in (
+        GuidedVelocity(0.5, 0.0),
+        GuidedVelocity(0.0, 0.4),
+        GuidedPosition(HERE.point),
+        GuidedHeading(1.0),
+    ):
+        command = ControlCommand(Purpose.DRIVE, setpoint, 1.0)
+        assert braked_harder(command, HELD, Bounds()) == command
+
+
+@pytest.mark.parametrize(("wall_m", "back_m_s"), [(7.0, 1.0), (3.5, 0.5), (2.0, 0.25), (0.6, 0.0)])
+def test_it_is_told_no_more_than_it_may_be_left_alone_with(wall_m: float, back_m_s: float) -> None:
+    """A wall so far behind it."""
+    map_ = ground()
+    pose = Pose(8.0, 10.0, 0.0, 0.0)
+    for east_m in np.arange(8.0, 12.0, 0.2):
+        put(map_, pose.north_m - wall_m, float(east_m))
+    held = replace(view(map_, pose, 0.3), held_m_s=1.0)
+    assert braked_harder(STAND, held, Bounds()).setpoint == GuidedVelocity(-back_m_s, 0.0)

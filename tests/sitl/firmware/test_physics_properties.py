@@ -81,7 +81,7 @@ def test_turn_rate_acceleration_velocity_and_place_fit_together(
 
 
 @pytest.mark.parametrize("turning_radius_m", [0.0, 2.0], ids=["skid", "ackermann"])
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_gyro_and_accelerometer_alone_find_the_place(turning_radius_m: float, seed: int) -> None:
     """Ten seconds of dead reckoning by the inertial sensors, as the firmware's estimator does it."""

@@ -17,6 +17,7 @@ from sitl.world.world import TOP_SPEED_M_S, Ground, World
 from tests.support.sitl_client import HOME, ready
 
 STEP_S = 0.005
+FORWARD_AND_TURN_MASK = 1511
 
 
 def ground(grip: float = 1.0, pace: float = 1.0, north_m: float = 0.0) -> World:
@@ -125,6 +126,28 @@ def driven(world: World, metres: float = 20.0, seconds: float = 15.0) -> Simulat
 def test_the_autopilot_drives_slowly_over_rough_ground_however_much_it_wants() -> None:
     assert driven(ground(), 100.0, 10.0).truth.speed_m_s == pytest.approx(2.0, abs=0.1)
     assert driven(ground(pace=0.2), 100.0, 10.0).truth.speed_m_s == pytest.approx(0.8, abs=0.02)
+
+
+def rolls_on_m(told_m_s: float) -> float:
+    """How far a rover that rough ground holds comes in 15 s; told so until it is slow, and then to stand."""
+    client = ready(Simulator(ground(pace=0.125), SimStart(0.5, 0.5, 0.0, HOME), "none", noise=False))
+
+    def tell(forward_m_s: float, seconds: float) -> None:
+        client.drive_at(forward_m_s, mask=FORWARD_AND_TURN_MASK, frame=8)
+        client.run_for(seconds)
+
+    for _ in range(60):
+        tell(2.0, 0.2)
+    before_m = client.simulator.truth.north_m
+    for _ in range(300):
+        tell(told_m_s if client.simulator.truth.speed_m_s > 0.1 else 0.0, 0.05)
+    return client.simulator.truth.north_m - before_m
+
+
+def test_a_rover_that_is_held_stands_far_sooner_where_it_is_told_to_roll_back() -> None:
+    """The autopilot's integrator has opened the throttle, and closes it slowly for a rover that is told to stand."""
+    stops_m, back_m = rolls_on_m(0.0), rolls_on_m(-1.0)
+    assert 0.5 < back_m < 0.6 * stops_m
 
 
 def test_on_slippery_ground_it_comes_to_rest_later() -> None:
