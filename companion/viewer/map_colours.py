@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-UNKNOWN_COLOUR = (197, 204, 211)
+UNKNOWN_COLOUR = (159, 169, 179)
 CELL_COLOURS: NDArray[np.uint8] = np.array(
     [UNKNOWN_COLOUR, (255, 255, 255), (18, 24, 30), (233, 201, 220), (242, 227, 179)], np.uint8
 )

@@ -73,6 +73,12 @@ class Page:
         element = self.driver.find_element(By.CSS_SELECTOR, selector)
         ActionChains(self.driver).move_to_element(element).click().perform()
 
+    def click_at(self, selector: str, x: int, y: int) -> None:
+        """So far right of and below the first element's left upper corner, with the mouse."""
+        element = self.driver.find_element(By.CSS_SELECTOR, selector)
+        left, top = x - element.size["width"] // 2, y - element.size["height"] // 2
+        ActionChains(self.driver).move_to_element_with_offset(element, left, top).click().perform()
+
     @property
     def faults(self) -> list[str]:
         """What the console says of errors."""

@@ -30,6 +30,14 @@ return [...document.querySelectorAll('body *')].filter(one => one.checkVisibilit
     && (one.getBoundingClientRect().right > innerWidth + 1 || one.getBoundingClientRect().left < -1))
     .map(one => `${one.className}: ${one.textContent.slice(0, 60)}`)
 """
+OVER_EACH_OTHER = """
+const shown = [...document.querySelectorAll('.map-buttons button, .actions, .strip')].filter(one => one.checkVisibility())
+    .map(one => [one, one.getBoundingClientRect()]);
+return shown.flatMap(([a, p], i) => shown.slice(i + 1).filter(([b, q]) => !a.contains(b) && !b.contains(a)
+    && Math.min(p.right, q.right) - Math.max(p.left, q.left) > 1
+    && Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top) > 1)
+    .map(([b]) => `${a.textContent.slice(0, 40)} / ${b.textContent.slice(0, 40)}`))
+"""
 
 
 def address_of(program: Program) -> str:
@@ -74,6 +82,13 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows("HOLD", "Paused on request")
             desktop.press("Go on")
             desktop.shows("GUIDED", "Going on as requested", "Go on: done")
+            for _ in range(4):
+                desktop.press("Zoom out (−)")
+            desktop.press("Send here")
+            desktop.click_at("canvas", 60, 150)
+            desktop.press("Send")
+            desktop.shows("Send here: outside the mission's grid")
+            desktop.press("Show everything (0)")
             desktop.press("Send here")
             desktop.click("canvas")
             desktop.press("Send")
@@ -107,13 +122,15 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
 
 
 def fits(shown: Page, size: tuple[int, int]) -> None:
-    """Nothing is wider than the window, or sticks out of it where it cannot be scrolled."""
+    """Nothing is wider than the window, sticks out of it where it cannot be scrolled, or lies over a button."""
     assert int(str(shown.run("return document.documentElement.scrollWidth"))) <= size[0]
     assert shown.run(STICKS_OUT) == []
+    assert shown.run(OVER_EACH_OTHER) == []
 
 
 def test_the_simulator_alone_is_shown_as_such(tmp_path: Path) -> None:
-    serve = ("serve", MISSIONS / "depot.toml", "--web", "0", "--listen", f"tcp:127.0.0.1:{free_port()}")
+    link = f"tcp:127.0.0.1:{free_port()}"
+    serve = ("serve", MISSIONS / "depot.toml", "--web", "0", "--listen", link, "--speedup", "2")
     with ours(tmp_path, "sitl", *serve) as program, page(DESKTOP) as shown:
         shown.open(address_of(program))
         shown.shows("Simulator: waiting for somebody to connect", "Depot", "live, simulator", "listening on tcp:")
@@ -124,6 +141,15 @@ def test_the_simulator_alone_is_shown_as_such(tmp_path: Path) -> None:
         shown.resize(PHONE)
         fits(shown, PHONE)
         assert shown.faults == []
+        run = ("run", MISSIONS / "depot.toml", "--connect", link, "--arm", "--web", "0")
+        with ours(tmp_path, "companion", *run) as companion:
+            shown.resize(DESKTOP)
+            shown.open(address_of(companion))
+            shown.shows("Depot", "live", "Driving to", "Targets")
+            assert "simulat" not in shown.text, "for the companion it is a rover like any other"
+            assert shown.faults == []
+            companion.child.send_signal(signal.SIGINT)
+            shown.shows("Stopped by the user")
 
 
 def test_a_report_plays_from_its_file_to_its_end(tmp_path: Path) -> None:
@@ -148,6 +174,15 @@ def test_a_report_plays_from_its_file_to_its_end(tmp_path: Path) -> None:
                    "s.dispatchEvent(new Event('change', {bubbles: true}))")  # fmt: skip
         report.press("Play or pause (Space)")
         report.shows("Done")
+        report.press("What the signs mean (L)")
+        report.shows("stop on the way")
+        report.press("What the signs mean (L)")
+        report.resize(PHONE)
+        fits(report, PHONE)
+        report.press("Figures")  # that take the place of the panel there
+        for tab in ("Now", "Decisions", "Tables"):
+            report.press(tab)
+            fits(report, PHONE)
         assert report.faults == []
 
 

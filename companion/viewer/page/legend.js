@@ -45,6 +45,7 @@ const KEYS = "Keys: + − zoom, 0 all, F follow, N north or heading up, T light 
 export class Legend {
   constructor(more = "") {
     this.rows = make("ul");
+    this.signs = [];
     this.node = make(
       "div",
       { class: "legend", hidden: true, role: "dialog", "aria-label": "What the signs mean" },
@@ -62,7 +63,7 @@ export class Legend {
 
   fill(areas, lines) {
     const row = ([name, text]) => make("li", {}, make("span", { class: `swatch ${name}` }), text);
-    this.rows.replaceChildren(...areas.map(row), ...lines.map(row));
+    this.rows.replaceChildren(...[...areas, ...lines, ...this.signs].map(row));
   }
 
   /** Says what is on the map of a companion, or on that of a simulator. */
@@ -70,6 +71,12 @@ export class Legend {
     if (!scene || this.truth === scene.truth) return;
     this.truth = scene.truth;
     this.fill(...(scene.truth ? [TRUE_AREAS, TRUE_LINES] : [AREAS, LINES]));
+  }
+
+  /** Adds a sign that only one of the pages has. */
+  addSign(name, text) {
+    this.signs.push([name, text]);
+    this.fill(AREAS, LINES);
   }
 
   /** Adds keys that only one of the pages has. */

@@ -1,4 +1,4 @@
-// What is drawn on the map beside the run itself: contacts, and in a report the tracks of other records.
+// What is drawn on the map beside the run itself: contacts, and in a report stops and the tracks of other records.
 
 import { make } from "viewer/dom.js";
 import { lastNotAbove } from "viewer/geometry.js";
@@ -25,6 +25,20 @@ export function drawContacts(pen, places) {
     context.fillStyle = colours.failed;
     context.fill();
     pen.label("contact", x, y, 14, { size: 12, colour: colours.failed });
+  }
+}
+
+/** Where the rover stopped on its way, as the squares of the timeline. */
+export function drawStops(pen, places) {
+  const { context, camera, colours } = pen;
+  for (const place of places) {
+    const [x, y] = camera.toScreen(...place);
+    context.beginPath();
+    context.rect(x - 6, y - 6, 12, 12);
+    pen.stroke(colours.halo, 4);
+    context.fillStyle = colours.ink;
+    context.fill();
+    pen.label("stop", x, y, 12, { size: 12, colour: colours.ink });
   }
 }
 

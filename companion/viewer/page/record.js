@@ -123,7 +123,8 @@ function eventsOf(record) {
       else if (GIVEN_UP.has(status)) events.push({ t: frame.t, kind: "given-up", text: `${name}: ${status}` });
     });
     const stands = frame.state === "stopped" || frame.state === "waiting";
-    if (stands && before.state === "driving") events.push({ t: frame.t, kind: "stop", text: frame.line });
+    if (stands && before.state === "driving")
+      events.push({ t: frame.t, kind: "stop", text: frame.line, place: (frame.pose ?? before.pose)?.slice(0, 2) });
   });
   for (const contact of record.contacts)
     events.push({ t: contact.t, kind: "contact", text: `Contact: ${contact.what}` });

@@ -8,7 +8,7 @@ import { addFiguresButton } from "viewer/figures_button.js";
 import { listen, listenKeys } from "viewer/gestures.js";
 import { MapView } from "viewer/map_view.js";
 import { Model } from "viewer/model.js";
-import { drawContacts, Others } from "viewer/overlays.js";
+import { drawContacts, drawStops, Others } from "viewer/overlays.js";
 import { Panel } from "viewer/panel.js";
 import { Playback } from "viewer/playback.js";
 import { readRecord, Record } from "viewer/record.js";
@@ -81,11 +81,10 @@ class ReportPage {
     this.view.above.push((pen) => {
       if (this.choosing) this.decisions.draw(pen);
       else this.others.drawPlaces(pen, this.playback.t);
-      const past = this.record.contacts.filter((contact) => contact.t <= this.playback.t);
-      drawContacts(
-        pen,
-        past.map((contact) => contact.place),
-      );
+      const { contacts, events } = this.record;
+      const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t).map((one) => one.place);
+      drawStops(pen, past(events.filter((event) => event.kind === "stop")));
+      drawContacts(pen, past(contacts));
     });
     this.decisions.changed = () => this.view.invalidate();
   }
@@ -97,6 +96,7 @@ class ReportPage {
     keys["]"] = () => this.decisions.step(this.playback.t, 1);
     keys[","] = () => this.jump(this.playback.t - SECOND_STEP_S);
     keys["."] = () => this.jump(this.playback.t + SECOND_STEP_S);
+    legend.addSign("halted", "stop on the way");
     legend.addKeys(", Space play, , and . a second back or on, [ and ] decision before or after");
     listenKeys(this.parts.canvas, this.camera, keys);
   }

@@ -4,7 +4,9 @@ export const UNKNOWN = "–";
 
 /** A number with a fixed count of digits after the point. */
 export function number(value, digits = 1) {
-  return Number.isFinite(value) ? value.toFixed(digits) : UNKNOWN;
+  if (!Number.isFinite(value)) return UNKNOWN;
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text; // never "-0.0"
 }
 
 /** A distance: centimetres matter near, not far. */
