@@ -31,8 +31,8 @@ return [...document.querySelectorAll('body *')].filter(one => one.checkVisibilit
     .map(one => `${one.className}: ${one.textContent.slice(0, 60)}`)
 """
 OVER_EACH_OTHER = """
-const shown = [...document.querySelectorAll('.map-buttons button, .actions, .strip')].filter(one => one.checkVisibility())
-    .map(one => [one, one.getBoundingClientRect()]);
+const shown = [...document.querySelectorAll('.map-buttons button, .actions, .strip')]
+    .filter(one => one.checkVisibility()).map(one => [one, one.getBoundingClientRect()]);
 return shown.flatMap(([a, p], i) => shown.slice(i + 1).filter(([b, q]) => !a.contains(b) && !b.contains(a)
     && Math.min(p.right, q.right) - Math.max(p.left, q.left) > 1
     && Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top) > 1)
