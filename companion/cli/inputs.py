@@ -10,8 +10,9 @@ from typing import Annotated
 
 import typer
 
+from companion.core.own_parts import OwnKind, OwnPartError, own_part
 from companion.planning.registry import UnknownPlannerError, make_planner
-from companion.settings import Settings, SettingsError, load_settings
+from companion.settings import CONTROLLERS, Settings, SettingsError, load_settings
 from companion.storage.files import refuse_pipe
 
 EXIT_BAD_INPUT = 2
@@ -38,12 +39,18 @@ class OutputError(Exception):
 
 
 def usable_settings(path: Path | None) -> Settings:
-    """The settings of a file (None: the defaults), with a planner that exists. Raises SettingsError."""
+    """The settings of a file (None: the defaults), with a planner and a controller that exist. Raises SettingsError."""
     settings = load_settings(path)
     try:
         make_planner(settings.navigator.planner, settings.planner)
     except UnknownPlannerError as error:
         raise SettingsError(f"{path}: navigator.planner: {error}") from error
+    controller = settings.guidance.controller
+    if controller not in CONTROLLERS:
+        try:
+            own_part(OwnKind.CONTROLLER, controller)
+        except OwnPartError as error:
+            raise SettingsError(f"{path}: guidance.controller: {error}") from error
     return settings
 
 

@@ -8,7 +8,7 @@ Nouns: motion planner.
 
 from __future__ import annotations
 
-from enum import StrEnum
+from collections.abc import Callable, Mapping
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -22,6 +22,7 @@ from companion.control.motion_kernels import (
     keep_all_within,
     next_generation,
 )
+from companion.core.own_parts import OwnKind, made_by
 
 Motions = NDArray[np.float64]
 """Shape (m, n, 2): m motions of n knots, each a speed (m/s) and a turn rate (rad/s)."""
@@ -30,14 +31,6 @@ KNOTS = 6
 SPEED_SHARES = np.array([0.125, 0.25, 0.5, 0.75, 1.0])
 TURN_SHARES = np.linspace(-1.0, 1.0, 9)
 """Of the fastest: the motions of one command that are always tried."""
-
-
-class MotionKind(StrEnum):
-    """The planners by name."""
-
-    GA = "motion-ga"
-    DWA = "dwa"
-    MPPI = "mppi"
 
 
 class Found(NamedTuple):
@@ -152,15 +145,20 @@ class Mppi:
         self._mean[:] = 0.0
 
 
-def motion_planner(kind: MotionKind, seed: int = 0) -> MotionPlanner:
-    """The planner with this name. ``seed``: of its random choices."""
-    match kind:
-        case MotionKind.GA:
-            return MotionGa(seed)
-        case MotionKind.DWA:
-            return DynamicWindow()
-        case MotionKind.MPPI:
-            return Mppi(seed)
+MOTION_PLANNERS: Mapping[str, Callable[[int], MotionPlanner]] = {
+    "motion-ga": MotionGa,
+    "dwa": lambda seed: DynamicWindow(),
+    "mppi": Mppi,
+}
+"""By the name of the controller that they make; called with the seed of their random choices."""
+
+
+def motion_planner(name: str, seed: int = 0) -> MotionPlanner:
+    """The planner of the controller with this name, one's own as well. Raises OwnPartError for one that is no use."""
+    if name in MOTION_PLANNERS:
+        return MOTION_PLANNERS[name](seed)
+    own: MotionPlanner = made_by(OwnKind.CONTROLLER, name, ("plan", "forget"), seed)
+    return own
 
 
 def constant_motions(model: RoverModel) -> Motions:

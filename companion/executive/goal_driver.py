@@ -14,7 +14,7 @@ from companion.control.collision_avoidance import CollisionAvoidance
 from companion.control.controller import STANDSTILL, ControlCommand, Controller
 from companion.control.local_view import LocalView
 from companion.control.motion_controller import MotionController
-from companion.control.motion_planners import MotionKind, motion_planner
+from companion.control.motion_planners import motion_planner
 from companion.control.point_controller import PointController
 from companion.control.reference_path import ReferencePath, advanced, reference_path
 from companion.control.stuck_recovery import StuckRecovery
@@ -62,7 +62,7 @@ class Tally:
 def controller_for(rover: RoverLimits, footprint: Footprint, kind: ControllerKind, seed: int) -> Controller:
     """What leads the rover along paths. ``seed``: of a motion planner's random choices."""
     if kind != "points":
-        return MotionController(footprint, motion_planner(MotionKind(kind), seed))
+        return MotionController(footprint, motion_planner(kind, seed))
     return ArcController() if rover.turning_radius_m > 0.0 else PointController()
 
 

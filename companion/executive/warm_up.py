@@ -16,7 +16,7 @@ from companion.control.following import Following
 from companion.control.local_view import LocalView
 from companion.control.model_estimate import fit_of
 from companion.control.motion_controller import MotionController
-from companion.control.motion_planners import MotionKind, motion_planner
+from companion.control.motion_planners import motion_planner
 from companion.control.motion_prediction import steered
 from companion.control.reference_path import ReferencePath
 from companion.control.safe_reach import farthest_clear
@@ -74,7 +74,7 @@ def _plan_motions(settings: Settings) -> None:
     evidence.log_odds.fill(-1.0)
     path = ReferencePath(np.column_stack((np.linspace(3.0, 12.0, 37), np.full(37, 8.0))))
     fit_of(Following(), np.zeros((2, 5)), 0.0)
-    planner = motion_planner(MotionKind(settings.guidance.controller))
+    planner = motion_planner(settings.guidance.controller)
     controller, rover = MotionController(Footprint.rectangle(0.7, 0.5), planner), RoverLimits(0.35, 2.0, 8.0)
     for tick in range(3):
         view = LocalView(Pose(3.0, 8.0, 0.0, 0.2 * tick), 1.0, evidence, rover, settings)

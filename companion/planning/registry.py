@@ -10,13 +10,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell
+from companion.core.own_parts import OwnKind, OwnPartError, looks_own, made_by, registered
 from companion.planning.bspline_ga.planner import BsplineGa
 from companion.planning.graph_search.astar import Astar
 from companion.planning.graph_search.dijkstra import Dijkstra
 from companion.planning.graph_search.dstar_lite import DstarLite
 from companion.planning.graph_search.theta_star import ThetaStar
 from companion.planning.hybrid import Hybrid
-from companion.planning.own_planners import OwnPlannerError, own_factory, registered
 from companion.planning.papers.achour_ga import AchourGa
 from companion.planning.papers.prm import Prm
 from companion.planning.papers.sedighi_ga import geisler, hermanu, sedighi
@@ -55,29 +55,18 @@ def make_planner(name: str, settings: PlannerSettings) -> Planner:
 
     Raises UnknownPlannerError.
     """
-    try:
-        factory = PLANNERS.get(name) or own_factory(name)
-    except OwnPlannerError as error:
-        raise UnknownPlannerError(str(error)) from error
-    if factory is None:
-        known = (*PLANNERS, *registered())
+    if name in PLANNERS:
+        return PLANNERS[name](settings)
+    if not looks_own(OwnKind.PLANNER, name):
+        known = (*PLANNERS, *registered(OwnKind.PLANNER))
         near = alike(name, known)
         hint = f", did you mean {near!r}?" if near else ";"
         raise UnknownPlannerError(f"unknown planner {name!r}{hint} known: {', '.join(known)}")
-    return factory(settings) if name in PLANNERS else _own(name, factory, settings)
-
-
-def _own(name: str, factory: PlannerFactory, settings: PlannerSettings) -> Planner:
-    """What another package makes, if it looks like a planner. Raises UnknownPlannerError."""
     try:
-        planner = factory(settings)
-    except Exception as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise UnknownPlannerError(f"planner {name!r:.80} cannot be made: {reason:.200}") from error
-    missing = [part for part in ("plan", "name", "capabilities") if not hasattr(planner, part)]
-    if missing:
-        raise UnknownPlannerError(f"planner {name!r:.80} has no {missing[0]}; docs/planners.md shows one")
-    return planner
+        own: Planner = made_by(OwnKind.PLANNER, name, ("plan", "name", "capabilities"), settings)
+    except OwnPartError as error:
+        raise UnknownPlannerError(str(error)) from error
+    return own
 
 
 def warm_up(names: Iterable[str] = tuple(PLANNERS), settings: PlannerSettings | None = None) -> None:

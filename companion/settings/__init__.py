@@ -3,6 +3,7 @@
 from companion.settings.planners import PlannerSettings
 from companion.settings.section import Section, SettingsError
 from companion.settings.settings import (
+    CONTROLLERS,
     ControllerKind,
     FenceSettings,
     GuidanceSettings,
@@ -20,6 +21,7 @@ from companion.settings.settings import (
 from companion.settings.settings_file import load_settings, parse_settings
 
 __all__ = [
+    "CONTROLLERS",
     "ControllerKind",
     "FenceSettings",
     "GuidanceSettings",

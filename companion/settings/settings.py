@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import AliasChoices, Field, NonNegativeFloat, model_validator
+from pydantic import AfterValidator, AliasChoices, Field, NonNegativeFloat, model_validator
 
+from companion.core.own_parts import OwnKind, looks_own, registered
 from companion.settings.planners import PlannerSettings
 from companion.settings.section import Section
+from companion.storage.validation import alike
 
 ControlPoints = Annotated[tuple[Annotated[int, Field(ge=3, le=64)], ...], Field(strict=False)]
 
@@ -92,7 +94,20 @@ class MappingSettings(Section):
     max_yaw_rate_deg_s: float = Field(120.0, gt=0.0, description="scans taken while turning faster are dropped")
 
 
-ControllerKind = Literal["points", "motion-ga", "dwa", "mppi"]
+CONTROLLERS = ("points", "motion-ga", "dwa", "mppi")
+
+
+def _there_is(name: str) -> str:
+    if name in CONTROLLERS or looks_own(OwnKind.CONTROLLER, name):
+        return name
+    known = (*CONTROLLERS, *registered(OwnKind.CONTROLLER))
+    near = alike(name, known)
+    hint = f", did you mean {near!r}?" if near else ";"
+    raise ValueError(f"unknown controller {name!r:.80}{hint} known: {', '.join(known)}")
+
+
+ControllerKind = Annotated[str, AfterValidator(_there_is)]
+"""One of ``CONTROLLERS``, or one's own."""
 
 
 class GuidanceSettings(Section):
@@ -179,7 +194,8 @@ class GuidanceSettings(Section):
     controller: ControllerKind = Field(
         "points",
         description="what leads the rover along its path: `points` sends positions (arcs where it cannot turn on the "
-        "spot); the others plan motions and send velocities, but not with single thin beams or a turning radius",
+        "spot); `motion-ga`, `dwa`, `mppi` and [your own](planners.md#a-controller-of-your-own) plan motions and send "
+        "velocities, but not with single thin beams or a turning radius",
     )
 
     @model_validator(mode="after")

@@ -17,11 +17,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from companion.core.own_parts import OwnKind, OwnPartError, looks_own, source_of
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
-from companion.planning.own_planners import OwnPlannerError, source_of
 from companion.planning.registry import PLANNERS
+from companion.settings.settings import CONTROLLERS
 from companion.storage.files import read_at_most
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.policies import ERROR
@@ -96,7 +97,7 @@ class Digests:
                 for file in _files(spec, self._folder):
                     digest.update(file.name.encode() + read_at_most(file, MOST_BYTES))
                 self._known[key] = digest.hexdigest()[:16]
-            except (OSError, MissionError, MapError, OwnPlannerError):
+            except (OSError, MissionError, MapError, OwnPartError):
                 self._known[key] = ""
         return self._known[key]
 
@@ -104,9 +105,14 @@ class Digests:
 def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
     if GroundSpec.of(spec.world) is None:
         yield from load_mission(folder / spec.world).files
-    source = None if spec.planner in PLANNERS else source_of(spec.planner)
+    own = (
+        (OwnKind.PLANNER, spec.planner, spec.planner in PLANNERS),
+        (OwnKind.CONTROLLER, spec.controller, spec.controller in CONTROLLERS),
+        (OwnKind.WORLD, spec.world.partition(" ")[0], "/" in spec.world),
+    )
+    sources = [source_of(kind, name) for kind, name, shipped in own if not shipped and looks_own(kind, name)]
     yield from (folder / name for name in (spec.faults, SensorSpec.of(spec.sensors).name) if name.endswith(".toml"))
-    yield from () if source is None else (source,)
+    yield from (source for source in sources if source is not None)
 
 
 def _lines(file: Path) -> list[str]:

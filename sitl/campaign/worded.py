@@ -17,7 +17,7 @@ from companion.mission.tables import Table
 from companion.storage.validation import describe_first
 from sitl.faults.fault_file import FaultFileError, fault_of, load_faults
 from sitl.faults.plan import FaultPlan
-from sitl.generators.kinds import KINDS, GroundKind, Parameters, is_kind
+from sitl.generators.kinds import Parameters, is_kind, parameters_of
 from sitl.sensors.range_sensors import SensorSuite
 from sitl.sensors.suites import suite_of
 
@@ -72,20 +72,23 @@ def _shown(value: Any) -> str:
 class GroundSpec:
     """Ground that is made from a seed."""
 
-    kind: GroundKind
+    kind: str
     given: Parameters
     movers: int = 0
 
     @classmethod
     def of(cls, text: str) -> GroundSpec | None:
-        """None for a text whose first word is no kind of ground: a mission's file. Raises ValueError."""
+        """None for a text whose first word is no kind of ground: a mission's file.
+
+        Raises ValueError (OwnPartError is one).
+        """
         if not is_kind(text.partition(" ")[0]):
             return None
-        name, values = Worded.of(text)
-        kind, movers = GroundKind(name), values.pop("movers", 0)
+        kind, values = Worded.of(text)
+        movers = values.pop("movers", 0)
         if not isinstance(movers, int) or not 0 <= movers <= MOST_MOVERS:
             raise ValueError(f"movers={movers}: give a whole number from 0 to {MOST_MOVERS}")
-        return cls(kind, _valid(KINDS[kind][0], values), movers)
+        return cls(kind, _valid(parameters_of(kind), values), movers)
 
 
 class SensorChanges(Table):

@@ -12,13 +12,17 @@ from PIL import Image
 from pydantic import ValidationError
 
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture, writable, written
-from companion.storage.validation import describe_first
+from companion.core.own_parts import OwnPartError
+from companion.storage.validation import alike, describe_first
 from sitl.generators.canvas import FINE_M
-from sitl.generators.kinds import KINDS, GroundKind, Parameters
+from sitl.generators.kinds import GroundKind, Parameters, is_kind, parameters_of
 from sitl.generators.made_ground import MadeGround, NoWayError, made
 from sitl.generators.measures import Difficulty, difficulty
 
 app = typer.Typer(add_completion=False, name="world", help="Worlds from seeds.", no_args_is_help=True)
+
+
+KNOWN = ", ".join(GroundKind)
 
 
 class WorldError(Exception):
@@ -32,7 +36,10 @@ def worlds() -> None:
 
 @app.command()
 def make(
-    kind: Annotated[GroundKind, typer.Argument(metavar="KIND", help=f"One of: {', '.join(GroundKind)}.")],
+    kind: Annotated[
+        str,
+        typer.Argument(metavar="KIND", help=f"One of: {KNOWN}; or one of your own by module:name (docs/worlds.md)."),
+    ],
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same world.")] = 0,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the kind; may be repeated.")
@@ -48,7 +55,7 @@ def make(
     try:
         picture(image)
         given = _given(kind, set_ or [])
-        mission = out / f"{kind}-{seed}.toml"
+        mission = out / f"{kind.replace(':', '-')}-{seed}.toml"
         writable(mission)
         ground = made(kind, seed, given, movers)
         measures = difficulty(ground)
@@ -57,7 +64,7 @@ def make(
         if image is not None:
             with written(image):
                 _draw(ground, seed, image)
-    except (WorldError, NoWayError, OutputError) as error:
+    except (WorldError, NoWayError, OwnPartError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     for line in _lines(measures):
@@ -65,29 +72,33 @@ def make(
     typer.echo(f"mission: {mission}; rover-sitl drive {mission} drives it")
 
 
-def _given(kind: GroundKind, listed: list[str]) -> Parameters:
+def _given(kind: str, listed: list[str]) -> Parameters:
     """The kind's parameters. Raises WorldError."""
+    if not is_kind(kind):
+        near = alike(kind, tuple(one.value for one in GroundKind))
+        raise WorldError(f"KIND {kind!r:.60} is unknown{f', did you mean {near!r}?' if near else ';'} known: {KNOWN}")
     values = {}
     for text in listed:
         name, equals, value = text.partition("=")
         if not equals:
             raise WorldError(f"--set {text:.60}: give a parameter as NAME=VALUE, like {_example(kind)}")
         values[name.strip()] = value.strip()
-    model = KINDS[kind][0]
+    model = parameters_of(kind)
     try:
         return model.model_validate(values)
     except ValidationError as error:
         raise WorldError(f"{kind}: {' '.join(describe_first(error, model).split())}; {_known(kind)}") from error
 
 
-def _example(kind: GroundKind) -> str:
-    name, value = next(iter(KINDS[kind][0]().model_dump().items()))
+def _example(kind: str) -> str:
+    name, value = next(iter(parameters_of(kind)().model_dump().items()))
     return f"{name}={value:g}"
 
 
-def _known(kind: GroundKind) -> str:
+def _known(kind: str) -> str:
     """The parameters of a kind with their values, for people."""
-    return "parameters: " + ", ".join(f"{name} ({value:g})" for name, value in KINDS[kind][0]().model_dump().items())
+    values = parameters_of(kind)().model_dump()
+    return "parameters: " + ", ".join(f"{name} ({value:g})" for name, value in values.items())
 
 
 def _lines(measures: Difficulty) -> list[str]:

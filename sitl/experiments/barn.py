@@ -21,11 +21,11 @@ from companion.core.footprint import Footprint
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
+from companion.settings.settings import CONTROLLERS
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.experiments import drawing
 from sitl.experiments.barn_worlds import GOAL_M, START_M, BarnWorld, made_world, read_worlds
 from sitl.experiments.experiment import (
-    CONTROLLERS,
     GUARD,
     OFF_MODEL,
     POINTS,

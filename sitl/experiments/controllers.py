@@ -15,9 +15,9 @@ from rich.table import Table
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
+from companion.settings.settings import CONTROLLERS
 from companion.settings.settings_file import parse_settings
 from sitl.experiments.experiment import (
-    CONTROLLERS,
     OFF_MODEL,
     POINTS,
     Advance,

@@ -13,15 +13,17 @@ from importlib.resources import files
 from itertools import starmap
 from os import cpu_count
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar, get_args, runtime_checkable
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from rich.table import Table
 
+from companion.control.motion_planners import motion_planner
 from companion.core.grid import Cell, Grid
+from companion.core.own_parts import OwnPartError
 from companion.mapping.map_files import load_map
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings
-from companion.settings.settings import ControllerKind
+from companion.settings.settings import CONTROLLERS, ControllerKind
 from companion.storage.files import why_no_file
 from companion.storage.shipped import SOURCE, shipped
 from sitl.experiments import drawing
@@ -31,7 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINTS: ControllerKind = "points"
-CONTROLLERS: tuple[ControllerKind, ...] = get_args(ControllerKind)
 GUARD = {"SCR_ENABLE": 1.0, "SCR_USER1": 300.0}
 """The guard on the autopilot puts HOLD so many milliseconds after the companion's last packet."""
 OFF_MODEL = 0.3
@@ -102,9 +103,17 @@ class Options:
 def chosen_controllers(options: Options, otherwise: tuple[ControllerKind, ...]) -> tuple[ControllerKind, ...]:
     """The controllers that were asked for, or others. Raises ExperimentError for one that does not exist."""
     for name in options.controllers:
-        if name not in CONTROLLERS:
-            raise ExperimentError(f"--controllers: {name!r:.60} is unknown; known are {', '.join(CONTROLLERS)}")
-    return tuple(name for name in CONTROLLERS if name in options.controllers) or otherwise
+        if name not in CONTROLLERS and ":" not in name:
+            raise ExperimentError(
+                f"--controllers: {name!r:.60} is unknown; known are {', '.join(CONTROLLERS)}, and module:name"
+            )
+        try:
+            if name not in CONTROLLERS:
+                motion_planner(name)
+        except OwnPartError as error:
+            raise ExperimentError(f"--controllers: {error}") from error
+    asked = dict.fromkeys(options.controllers)
+    return (*(name for name in CONTROLLERS if name in asked), *(name for name in asked if ":" in name)) or otherwise
 
 
 class ExperimentReport(ABC):

@@ -1,17 +1,21 @@
-"""Kinds of ground: small functions that draw obstacles from random numbers, each with its parameters.
+"""Kinds of ground: each has its parameters, and draws obstacles from random numbers with them.
+
+One's own are named ``module:name`` or by an entry point of ``rover_companion.worlds``.
 
 Nouns: ground kind.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import zlib
+from abc import ABC, abstractmethod
 from enum import StrEnum
 from typing import Any, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from companion.core.own_parts import OwnKind, OwnPartError, looks_own, own_part
 from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, disc, empty, fill, free, wall
 from sitl.world.world import Obstacles
 
@@ -33,12 +37,12 @@ class GroundKind(StrEnum):
 
 
 def is_kind(world: str) -> bool:
-    """Whether this names a kind of ground, and not a file."""
-    return world in set(GroundKind)
+    """Whether this names a kind of ground, one's own as well, and not a file."""
+    return world in set(GroundKind) or ("/" not in world and looks_own(OwnKind.WORLD, world))
 
 
-class Parameters(BaseModel):
-    """What a kind may be told."""
+class Parameters(BaseModel, ABC):
+    """What a kind may be told; it draws the ground."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -51,6 +55,10 @@ class Parameters(BaseModel):
                 raise ValueError(f"{name} {most:g} is less than least_{name[5:]} {least:g}")
         return self
 
+    @abstractmethod
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """Where something stands, on fields of ``FINE_M`` from the south-west corner: see ``canvas``."""
+
 
 class Clutter(Parameters):
     """Boxes and posts."""
@@ -58,16 +66,16 @@ class Clutter(Parameters):
     least_things: int = Field(90, ge=0, le=400, description="boxes and posts")
     most_things: int = Field(149, ge=0, le=400, description="boxes and posts")
 
-
-def _clutter(rng: np.random.Generator, given: Clutter) -> Obstacles:
-    solid = empty()
-    for _ in range(int(rng.integers(given.least_things, given.most_things + 1))):
-        north_m, east_m = rng.uniform((0.0, 6.0), (NORTH_M, EAST_M - 6.0))
-        if rng.random() < 0.5:
-            fill(solid, north_m, east_m, *rng.uniform(0.4, 2.5, 2))
-        else:
-            disc(solid, north_m, east_m, rng.uniform(0.15, 1.0))
-    return solid
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """See ``Parameters``."""
+        solid = empty()
+        for _ in range(int(rng.integers(self.least_things, self.most_things + 1))):
+            north_m, east_m = rng.uniform((0.0, 6.0), (NORTH_M, EAST_M - 6.0))
+            if rng.random() < 0.5:
+                fill(solid, north_m, east_m, *rng.uniform(0.4, 2.5, 2))
+            else:
+                disc(solid, north_m, east_m, rng.uniform(0.15, 1.0))
+        return solid
 
 
 class Rooms(Parameters):
@@ -79,27 +87,26 @@ class Rooms(Parameters):
     most_door_m: float = Field(2.0, ge=NARROWEST_M, le=5.0, description="width of doors")
     room_m: float = Field(9.0, ge=5.0, le=20.0, description="rooms as long as this are divided again")
 
-
-def _rooms(rng: np.random.Generator, given: Rooms) -> Obstacles:
-    """Halved again and again by walls, each with a door or two."""
-    solid, doors_m = empty(), (given.least_door_m, given.most_door_m)
-    areas = [(0.0, 5.0, NORTH_M, EAST_M - 10.0)]
-    wall(solid, rng, 0.0, 5.0, NORTH_M, doors_m, along_north=True)
-    wall(solid, rng, 0.0, EAST_M - 5.0, NORTH_M, doors_m, along_north=True)
-    while areas:
-        south_m, west_m, height_m, width_m = areas.pop()
-        if max(height_m, width_m) < given.room_m:
-            continue
-        share = rng.uniform(0.4, 0.6)
-        if height_m > width_m:
-            cut_m = share * height_m
-            wall(solid, rng, south_m + cut_m, west_m, width_m, doors_m, along_north=False)
-            areas += [(south_m, west_m, cut_m, width_m), (south_m + cut_m, west_m, height_m - cut_m, width_m)]
-        else:
-            cut_m = share * width_m
-            wall(solid, rng, south_m, west_m + cut_m, height_m, doors_m, along_north=True)
-            areas += [(south_m, west_m, height_m, cut_m), (south_m, west_m + cut_m, height_m, width_m - cut_m)]
-    return solid
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """Halved again and again by walls, each with a door or two."""
+        solid, doors_m = empty(), (self.least_door_m, self.most_door_m)
+        areas = [(0.0, 5.0, NORTH_M, EAST_M - 10.0)]
+        wall(solid, rng, 0.0, 5.0, NORTH_M, doors_m, along_north=True)
+        wall(solid, rng, 0.0, EAST_M - 5.0, NORTH_M, doors_m, along_north=True)
+        while areas:
+            south_m, west_m, height_m, width_m = areas.pop()
+            if max(height_m, width_m) < self.room_m:
+                continue
+            share = rng.uniform(0.4, 0.6)
+            if height_m > width_m:
+                cut_m = share * height_m
+                wall(solid, rng, south_m + cut_m, west_m, width_m, doors_m, along_north=False)
+                areas += [(south_m, west_m, cut_m, width_m), (south_m + cut_m, west_m, height_m - cut_m, width_m)]
+            else:
+                cut_m = share * width_m
+                wall(solid, rng, south_m, west_m + cut_m, height_m, doors_m, along_north=True)
+                areas += [(south_m, west_m, height_m, cut_m), (south_m, west_m + cut_m, height_m, width_m - cut_m)]
+        return solid
 
 
 class Yard(Parameters):
@@ -111,19 +118,19 @@ class Yard(Parameters):
     most_gate_m: float = Field(2.0, ge=NARROWEST_M, le=5.0, description="width of gates")
     most_containers: int = Field(3, ge=1, le=8, description="between two fences")
 
-
-def _yard(rng: np.random.Generator, given: Yard) -> Obstacles:
-    solid = empty()
-    east_m = float(rng.uniform(8.0, 11.0))
-    while east_m < EAST_M - 7.0:
-        wall(solid, rng, 0.0, east_m, NORTH_M, (given.least_gate_m, given.most_gate_m), along_north=True)
-        following_m = east_m + float(rng.uniform(7.0, 11.0))
-        for _ in range(int(rng.integers(1, given.most_containers + 1))):
-            south_m, west_m = rng.uniform((0.0, east_m + 2.5), (NORTH_M - 6.0, east_m + 4.0))
-            height_m, width_m = (2.4, 1.2) if rng.random() < 0.5 else (6.0, 2.4)
-            fill(solid, south_m, west_m, height_m, width_m)
-        east_m = following_m
-    return solid
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """See ``Parameters``."""
+        solid = empty()
+        east_m = float(rng.uniform(8.0, 11.0))
+        while east_m < EAST_M - 7.0:
+            wall(solid, rng, 0.0, east_m, NORTH_M, (self.least_gate_m, self.most_gate_m), along_north=True)
+            following_m = east_m + float(rng.uniform(7.0, 11.0))
+            for _ in range(int(rng.integers(1, self.most_containers + 1))):
+                south_m, west_m = rng.uniform((0.0, east_m + 2.5), (NORTH_M - 6.0, east_m + 4.0))
+                height_m, width_m = (2.4, 1.2) if rng.random() < 0.5 else (6.0, 2.4)
+                fill(solid, south_m, west_m, height_m, width_m)
+            east_m = following_m
+        return solid
 
 
 class Maze(Parameters):
@@ -132,24 +139,23 @@ class Maze(Parameters):
     corridor_m: float = Field(3.0, ge=1.6, le=8.0, description="width of corridors, walls of 0.2 m included")
     loops: float = Field(0.1, ge=0.0, le=1.0, description="share of inner walls that are taken away again")
 
-
-def _maze(rng: np.random.Generator, given: Maze) -> Obstacles:
-    """Depth first from cell to cell; every cell is reached."""
-    step_m, solid = given.corridor_m, empty()
-    rows, columns = int(NORTH_M // step_m), int((EAST_M - 8.0) // step_m)
-    west_m, south_m = 0.5 * (EAST_M - columns * step_m), 0.5 * (NORTH_M - rows * step_m)
-    opened = _opened(rng, rows, columns, given.loops)
-    for row in range(rows + 1):
-        for column in range(columns + 1):
-            place = south_m + row * step_m, west_m + column * step_m
-            if column < columns and ((row - 1, column), (row, column)) not in opened:
-                fill(solid, place[0], place[1], 0.2, step_m + 0.2)
-            if row < rows and ((row, column - 1), (row, column)) not in opened:
-                fill(solid, place[0], place[1], step_m + 0.2, 0.2)
-    for east_m in (west_m, west_m + columns * step_m):
-        row = int(rng.integers(rows))
-        free(solid, south_m + row * step_m + 0.2, east_m, step_m - 0.2, 0.2)
-    return solid
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """Depth first from cell to cell; every cell is reached."""
+        step_m, solid = self.corridor_m, empty()
+        rows, columns = int(NORTH_M // step_m), int((EAST_M - 8.0) // step_m)
+        west_m, south_m = 0.5 * (EAST_M - columns * step_m), 0.5 * (NORTH_M - rows * step_m)
+        opened = _opened(rng, rows, columns, self.loops)
+        for row in range(rows + 1):
+            for column in range(columns + 1):
+                place = south_m + row * step_m, west_m + column * step_m
+                if column < columns and ((row - 1, column), (row, column)) not in opened:
+                    fill(solid, place[0], place[1], 0.2, step_m + 0.2)
+                if row < rows and ((row, column - 1), (row, column)) not in opened:
+                    fill(solid, place[0], place[1], step_m + 0.2, 0.2)
+        for east_m in (west_m, west_m + columns * step_m):
+            row = int(rng.integers(rows))
+            free(solid, south_m + row * step_m + 0.2, east_m, step_m - 0.2, 0.2)
+        return solid
 
 
 def _opened(rng: np.random.Generator, rows: int, columns: int, loops: float) -> set[tuple[Any, Any]]:
@@ -185,13 +191,13 @@ class Forest(Parameters):
     least_radius_m: float = Field(0.08, ge=0.05, le=1.0, description="of trunks")
     most_radius_m: float = Field(0.35, ge=0.05, le=1.0, description="of trunks")
 
-
-def _forest(rng: np.random.Generator, given: Forest) -> Obstacles:
-    solid = empty()
-    for _ in range(int(rng.poisson(given.per_100_m2 * NORTH_M * (EAST_M - 8.0) / 100.0))):
-        north_m, east_m = rng.uniform((0.0, 4.0), (NORTH_M, EAST_M - 4.0))
-        disc(solid, north_m, east_m, rng.uniform(given.least_radius_m, given.most_radius_m))
-    return solid
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """See ``Parameters``."""
+        solid = empty()
+        for _ in range(int(rng.poisson(self.per_100_m2 * NORTH_M * (EAST_M - 8.0) / 100.0))):
+            north_m, east_m = rng.uniform((0.0, 4.0), (NORTH_M, EAST_M - 4.0))
+            disc(solid, north_m, east_m, rng.uniform(self.least_radius_m, self.most_radius_m))
+        return solid
 
 
 class Crops(Parameters):
@@ -201,19 +207,18 @@ class Crops(Parameters):
     plant_m: float = Field(0.3, ge=0.1, le=1.0, description="diameter of plants")
     gaps: float = Field(0.02, ge=0.0, le=0.3, description="share of places along a row at which 2.5 m have failed")
 
-
-def _crops(rng: np.random.Generator, given: Crops) -> Obstacles:
-    """Rows run north: to cross them the rover looks for gaps, or drives round on the headland."""
-    solid = empty()
-    east_m = 9.0
-    while east_m < EAST_M - 9.0:
-        north_m = float(rng.uniform(3.0, 4.0))
-        last_m = NORTH_M - float(rng.uniform(3.0, 4.0))
-        while north_m < last_m:
-            disc(solid, north_m, east_m + rng.uniform(-0.1, 0.1), 0.5 * given.plant_m)
-            north_m += 2.5 if rng.random() < given.gaps else 0.8 * given.plant_m
-        east_m += given.row_m
-    return solid
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """Rows run north: to cross them the rover looks for gaps, or drives round on the headland."""
+        solid = empty()
+        east_m = 9.0
+        while east_m < EAST_M - 9.0:
+            north_m = float(rng.uniform(3.0, 4.0))
+            last_m = NORTH_M - float(rng.uniform(3.0, 4.0))
+            while north_m < last_m:
+                disc(solid, north_m, east_m + rng.uniform(-0.1, 0.1), 0.5 * self.plant_m)
+                north_m += 2.5 if rng.random() < self.gaps else 0.8 * self.plant_m
+            east_m += self.row_m
+        return solid
 
 
 class Warehouse(Parameters):
@@ -223,20 +228,20 @@ class Warehouse(Parameters):
     rack_m: float = Field(8.0, ge=2.0, le=20.0, description="length of racks")
     pallets: int = Field(8, ge=0, le=60, description="of 1.2 x 0.8 m, in the aisles")
 
-
-def _warehouse(rng: np.random.Generator, given: Warehouse) -> Obstacles:
-    solid = empty()
-    south_m = 1.5
-    while south_m + 1.1 < NORTH_M - 1.0:
-        east_m = 7.0 + float(rng.uniform(0.0, 1.5))
-        while east_m + given.rack_m < EAST_M - 6.0:
-            fill(solid, south_m, east_m, 1.1, given.rack_m)
-            east_m += given.rack_m + given.aisle_m
-        south_m += 1.1 + given.aisle_m
-    for _ in range(given.pallets):
-        north_m, east_m = rng.uniform((1.0, 7.0), (NORTH_M - 2.0, EAST_M - 8.0))
-        fill(solid, north_m, east_m, *((1.2, 0.8) if rng.random() < 0.5 else (0.8, 1.2)))
-    return solid
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """See ``Parameters``."""
+        solid = empty()
+        south_m = 1.5
+        while south_m + 1.1 < NORTH_M - 1.0:
+            east_m = 7.0 + float(rng.uniform(0.0, 1.5))
+            while east_m + self.rack_m < EAST_M - 6.0:
+                fill(solid, south_m, east_m, 1.1, self.rack_m)
+                east_m += self.rack_m + self.aisle_m
+            south_m += 1.1 + self.aisle_m
+        for _ in range(self.pallets):
+            north_m, east_m = rng.uniform((1.0, 7.0), (NORTH_M - 2.0, EAST_M - 8.0))
+            fill(solid, north_m, east_m, *((1.2, 0.8) if rng.random() < 0.5 else (0.8, 1.2)))
+        return solid
 
 
 class Cylinders(Parameters):
@@ -246,30 +251,44 @@ class Cylinders(Parameters):
     smoothed: int = Field(1, ge=0, le=4, description="rounds of the automaton")
     step_m: float = Field(0.4, ge=0.15, le=1.0, description="side of a cell of the lattice; a post is half as wide")
 
+    def draw(self, rng: np.random.Generator) -> Obstacles:
+        """See ``Parameters``."""
+        solid, west_m = empty(), 10.0
+        rows, columns = round(NORTH_M / self.step_m), round((EAST_M - 2.0 * west_m) / self.step_m)
+        lattice = rng.random((rows, columns)) < self.filled
+        for _ in range(self.smoothed):
+            padded = np.pad(lattice, 1).astype(np.int8)
+            near = sum(padded[y : y + rows, x : x + columns] for y in range(3) for x in range(3))
+            lattice = (near >= 4) | (lattice & (near >= 2))
+        for row, column in np.argwhere(lattice):
+            north_m, east_m = (row + 0.5) * self.step_m, west_m + (column + 0.5) * self.step_m
+            disc(solid, north_m, east_m, 0.25 * self.step_m + 0.5 * FINE_M)
+        return solid
 
-def _cylinders(rng: np.random.Generator, given: Cylinders) -> Obstacles:
-    solid, west_m = empty(), 10.0
-    rows, columns = round(NORTH_M / given.step_m), round((EAST_M - 2.0 * west_m) / given.step_m)
-    lattice = rng.random((rows, columns)) < given.filled
-    for _ in range(given.smoothed):
-        padded = np.pad(lattice, 1).astype(np.int8)
-        near = sum(padded[y : y + rows, x : x + columns] for y in range(3) for x in range(3))
-        lattice = (near >= 4) | (lattice & (near >= 2))
-    for row, column in np.argwhere(lattice):
-        north_m, east_m = (row + 0.5) * given.step_m, west_m + (column + 0.5) * given.step_m
-        disc(solid, north_m, east_m, 0.25 * given.step_m + 0.5 * FINE_M)
-    return solid
 
-
-Maker = Callable[[np.random.Generator, Any], Obstacles]
-KINDS: dict[GroundKind, tuple[type[Parameters], Maker]] = {
-    GroundKind.CLUTTER: (Clutter, _clutter),
-    GroundKind.ROOMS: (Rooms, _rooms),
-    GroundKind.YARD: (Yard, _yard),
-    GroundKind.MAZE: (Maze, _maze),
-    GroundKind.FOREST: (Forest, _forest),
-    GroundKind.CROPS: (Crops, _crops),
-    GroundKind.WAREHOUSE: (Warehouse, _warehouse),
-    GroundKind.CYLINDERS: (Cylinders, _cylinders),
+KINDS: dict[GroundKind, type[Parameters]] = {
+    GroundKind.CLUTTER: Clutter,
+    GroundKind.ROOMS: Rooms,
+    GroundKind.YARD: Yard,
+    GroundKind.MAZE: Maze,
+    GroundKind.FOREST: Forest,
+    GroundKind.CROPS: Crops,
+    GroundKind.WAREHOUSE: Warehouse,
+    GroundKind.CYLINDERS: Cylinders,
 }
-"""The parameters of each kind, and what draws it."""
+"""Each kind's parameters, which draw it."""
+
+
+def parameters_of(kind: str) -> type[Parameters]:
+    """The parameters of a kind of this name. Raises OwnPartError for one's own that is none."""
+    if kind in set(GroundKind):
+        return KINDS[GroundKind(kind)]
+    own = own_part(OwnKind.WORLD, kind)
+    if not (isinstance(own, type) and issubclass(own, Parameters)):
+        raise OwnPartError(f"world {kind!r:.80} is no class of sitl.generators.kinds.Parameters; see docs/worlds.md")
+    return own
+
+
+def stream_of(kind: str) -> int:
+    """The number that separates the random draws of a kind from those of others with the same seed."""
+    return list(GroundKind).index(GroundKind(kind)) if kind in set(GroundKind) else zlib.crc32(kind.encode())

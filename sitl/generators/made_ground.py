@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Cell, inflated
+from companion.core.own_parts import OwnPartError
 from companion.mission.mission import HomePoint, MoverSpec
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import make_planner
 from companion.settings import PlannerSettings
-from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, free
-from sitl.generators.kinds import KINDS, GroundKind, Parameters
+from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, empty, free
+from sitl.generators.kinds import Parameters, parameters_of, stream_of
 from sitl.world.world import Obstacles, World
 from sitl.world.world_file import movers_of
 
@@ -26,7 +27,7 @@ END_M = 4.0
 """Nothing stands within this of the two ends."""
 WAY_RESOLUTION_M = 0.2
 MOST_DRAWN = 60
-MOVER_STREAM = 52
+GROUND_STREAM, MOVER_STREAM = 51, 52
 ROOM_M, WALL_M = 7.0, 1.0
 """Nothing moves within these of the west and the east edge, and of the others."""
 
@@ -42,7 +43,7 @@ class MadeGround:
     ``way_m``: the shortest on fields of ``WAY_RESOLUTION_M``, shape (n, 2), north and east.
     """
 
-    kind: GroundKind
+    kind: str
     world: World
     start_m: tuple[float, float]
     goal_m: tuple[float, float]
@@ -50,16 +51,18 @@ class MadeGround:
     movers: tuple[MoverSpec, ...] = ()
 
 
-def made(kind: GroundKind, seed: int, given: Parameters | None = None, movers: int = 0) -> MadeGround:
+def made(kind: str, seed: int, given: Parameters | None = None, movers: int = 0) -> MadeGround:
     """The ground of a seed; drawn again until there is a way for a disc of ``BODY_M``.
 
     ``given``: the kind's parameters; None: as they are without a word. ``movers``: things that drive to and fro.
-    Raises NoWayError.
+    Raises NoWayError, and OwnPartError for a kind of one's own that draws no ground.
     """
-    model, draw = KINDS[kind]
-    rng = np.random.default_rng([seed, list(GroundKind).index(kind), 51])
+    parameters = given or parameters_of(kind)()
+    rng = np.random.default_rng([seed, stream_of(kind), GROUND_STREAM])
     for _ in range(MOST_DRAWN):
-        solid = draw(rng, given or model())
+        solid = parameters.draw(rng)
+        if solid.shape != empty().shape or solid.dtype != np.bool_:
+            raise OwnPartError(f"world {kind!r:.80} draws {solid.dtype} of shape {solid.shape}; begin with empty()")
         start_m = float(rng.uniform(END_M, NORTH_M - END_M)), 3.0
         goal_m = float(rng.uniform(END_M, NORTH_M - END_M)), EAST_M - 3.0
         for north_m, east_m in (start_m, goal_m):
@@ -91,7 +94,7 @@ def _way(solid: Obstacles, start_m: tuple[float, float], goal_m: tuple[float, fl
 
 def _movers(ground: MadeGround, seed: int, count: int) -> tuple[MoverSpec, ...]:
     """Discs that cross the way to and fro; they pass through what stands, and announce nothing."""
-    rng = np.random.default_rng([seed, list(GroundKind).index(ground.kind), MOVER_STREAM])
+    rng = np.random.default_rng([seed, stream_of(ground.kind), MOVER_STREAM])
     movers = []
     for number in range(1, count + 1):
         north_m, east_m = ground.way_m[int(rng.uniform(0.2, 0.8) * (len(ground.way_m) - 1))]

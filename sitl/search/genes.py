@@ -18,7 +18,7 @@ from companion.settings.tunable_parameters import TABLE
 from sitl.campaign.campaign_file import CampaignTable, SearchPart
 from sitl.campaign.run_spec import RunSpec
 from sitl.campaign.worded import BETWEEN_FAULTS, NOTHING, GroundSpec, SensorSpec, Worded
-from sitl.generators.kinds import KINDS
+from sitl.generators.kinds import parameters_of
 
 Values = Mapping[str, float]
 """By the names of genes; a gene without a value is as usual."""
@@ -124,9 +124,12 @@ def _of_ground(world: str) -> tuple[Gene, ...]:
     if ground is None:
         return ()
     genes = []
-    for name, field in KINDS[ground.kind][0].model_fields.items():
-        low = next(float(one.ge) for one in field.metadata if isinstance(one, Ge))  # type: ignore[arg-type]
-        high = next(float(one.le) for one in field.metadata if isinstance(one, Le))  # type: ignore[arg-type]
+    for name, field in parameters_of(ground.kind).model_fields.items():
+        lows = [float(one.ge) for one in field.metadata if isinstance(one, Ge)]  # type: ignore[arg-type]
+        highs = [float(one.le) for one in field.metadata if isinstance(one, Le)]  # type: ignore[arg-type]
+        if not lows or not highs:
+            continue  # one's own, without bounds
+        low, high = lows[0], highs[0]
         usual = float(getattr(ground.given, name))
         if usual > 0.0:  # far from the usual most grounds have no way
             low, high = max(low, usual / WORLD_FACTOR), min(high, usual * WORLD_FACTOR)

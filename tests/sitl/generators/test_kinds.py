@@ -78,7 +78,7 @@ def test_the_command_writes_a_mission_that_is_driven_in_that_world(tmp_path: Pat
         assert "tortuosity" in result.output and drawn.size[0] > 600
     mission = load_mission(tmp_path / "warehouse-2.toml")
     scenario = scenario_from_mission(mission)
-    ground = made(GroundKind.WAREHOUSE, 2, KINDS[GroundKind.WAREHOUSE][0](pallets=3), 2)  # type: ignore[call-arg]
+    ground = made(GroundKind.WAREHOUSE, 2, KINDS[GroundKind.WAREHOUSE](pallets=3), 2)  # type: ignore[call-arg]
     assert np.array_equal(scenario.world.obstacles, ground.world.obstacles)
     assert scenario.start.north_m == pytest.approx(ground.start_m[0], abs=FINE_M)
     assert len(scenario.world.movers) == 2
@@ -103,7 +103,7 @@ def test_what_cannot_be_made_is_one_line(tmp_path: Path, arguments: list[str], s
 def parameter_rows() -> list[str]:
     """The table of the page."""
     rows = []
-    for kind, (model, _) in KINDS.items():
+    for kind, model in KINDS.items():
         for name, field in model.model_fields.items():
             bounds = {side: getattr(one, side) for one in field.metadata for side in ("ge", "le") if hasattr(one, side)}
             least, most = bounds["ge"], bounds["le"]

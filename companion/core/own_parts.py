@@ -1,0 +1,100 @@
+"""Parts from other packages: planners, controllers and worlds, by ``module:name`` or registered as entry points.
+
+The groups of entry points are ``rover_companion.planners``, ``.controllers`` and ``.worlds``.
+
+Nouns: own part.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from enum import StrEnum
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+
+class OwnKind(StrEnum):
+    """What may come from elsewhere."""
+
+    PLANNER = "planner"
+    CONTROLLER = "controller"
+    WORLD = "world"
+
+    @property
+    def group(self) -> str:
+        """The entry points' group."""
+        return f"rover_companion.{self}s"
+
+
+class OwnPartError(ValueError):
+    """A part of one's own that cannot be used; the text is one line."""
+
+
+def registered(kind: OwnKind) -> tuple[str, ...]:
+    """The names that installed packages have registered."""
+    return tuple(sorted({one.name for one in entry_points(group=kind.group)}))
+
+
+def looks_own(kind: OwnKind, name: str) -> bool:
+    """Whether this is ``module:name``, or a name that a package has registered. Nothing is loaded."""
+    return ":" in name or name in registered(kind)
+
+
+def own_part(kind: OwnKind, name: str) -> Any:
+    """The class or function that makes the part; None for a name that is neither form.
+
+    ``module:name`` is looked for beside the installed packages in the present folder, too. Raises OwnPartError.
+    """
+    try:
+        if ":" in name:
+            module, _, attribute = name.partition(":")
+            found = getattr(_imported(module), attribute)
+        else:
+            points = tuple(entry_points(group=kind.group, name=name))
+            if not points:
+                return None
+            found = points[0].load()
+    except Exception as error:
+        raise OwnPartError(f"{kind} {name!r:.80} cannot be loaded: {_reason(error)}") from error
+    if not callable(found):
+        raise OwnPartError(f"{kind} {name!r:.80} is no class or function that makes a {kind}")
+    return found
+
+
+def made_by(kind: OwnKind, name: str, needs: tuple[str, ...], *given: object) -> Any:
+    """What an own part makes of ``given``; it must have all of ``needs``. Raises OwnPartError."""
+    factory = own_part(kind, name)
+    try:
+        made = factory(*given)
+    except Exception as error:
+        raise OwnPartError(f"{kind} {name!r:.80} cannot be made: {_reason(error)}") from error
+    missing = [part for part in needs if not hasattr(made, part)]
+    if missing:
+        raise OwnPartError(f"{kind} {name!r:.80} has no {missing[0]}; docs/planners.md shows one")
+    return made
+
+
+def source_of(kind: OwnKind, name: str) -> Path | None:
+    """The file that an own part comes from, for those who must know when it changes; None for others."""
+    part = own_part(kind, name)
+    if part is None:
+        return None
+    module = name.partition(":")[0] if ":" in name else getattr(part, "__module__", "")
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return None if file is None else Path(file)
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:200]
+
+
+def _imported(module: str) -> object:
+    """The module; the present folder comes last, and only while it is imported."""
+    before = list(sys.path)
+    sys.path.append(str(Path.cwd()))
+    try:
+        return importlib.import_module(module)
+    finally:
+        sys.path[:] = before

@@ -1,0 +1,130 @@
+"""Parts of one's own, as on the pages: the planner keeps the contract, the controller drives, the world has a way."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from companion.cli.commands import app
+from companion.core.own_parts import OwnKind, OwnPartError, source_of
+from companion.mission.load import load_mission
+from companion.planning.planner import Planner
+from companion.planning.registry import UnknownPlannerError, make_planner
+from companion.settings import PlannerSettings
+from sitl.campaign.worded import GroundSpec
+from sitl.cli.commands import app as sitl
+from sitl.generators.made_ground import made as ground_of
+from tests.docs.test_docs import blocks
+
+MAPS = Path(__file__).resolve().parents[2] / "missions" / "maps"
+
+
+@pytest.fixture
+def lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    return written("planners.md", "Lines", tmp_path, monkeypatch)
+
+
+def written(page: str, name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The page's class in a file of its own in the present folder; ``module:name`` of it."""
+    (text,) = (text for where, text in blocks("python") if where.startswith(page) and f"class {name}" in text)
+    module = name.lower()
+    (folder / f"{module}.py").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(folder)
+    monkeypatch.delitem(sys.modules, module, raising=False)
+    return f"{module}:{name}"
+
+
+def test_the_planner_of_the_page_keeps_the_contract_and_finds_a_way(lines: str) -> None:
+    before = list(sys.path)
+    told = CliRunner().invoke(app, ["check-planner", lines])
+    assert told.exit_code == 0, told.output
+    page = (MAPS.parents[1] / "docs" / "planners.md").read_text(encoding="utf-8")
+    assert told.output.strip() in page, "paste what is printed"
+    where = [str(MAPS / "known-1.png"), "--start", "0,24", "--target", "20,24"]
+    planned = CliRunner().invoke(app, ["plan", *where, "--planner", lines])
+    assert planned.exit_code == 0 and "lines" in planned.output, planned.output
+    assert sys.path == before and source_of(OwnKind.PLANNER, lines) == Path("lines.py").resolve()
+
+
+def test_a_planner_that_breaks_the_contract_is_told_with_the_problem(
+    lines: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = Path("lines.py").read_text(encoding="utf-8")
+    Path("lines.py").write_text(text.replace("is not PathFault.NONE", "is None"), encoding="utf-8")
+    told = CliRunner().invoke(app, ["check-planner", lines])
+    assert told.exit_code == 3 and "its path: " in told.output and "#" in told.output
+    number = told.output.rpartition("--seed ")[2].strip()
+    again = CliRunner().invoke(app, ["check-planner", lines, "--problems", "1", "--seed", number])
+    assert again.output == told.output
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("lines:Nothing", "planner 'lines:Nothing' cannot be loaded: AttributeError"),
+        ("no_such_module:A", "cannot be loaded: ModuleNotFoundError"),
+        ("lines:__name__", "is no class or function"),
+        ("line", "unknown planner 'line'"),
+    ],
+)
+def test_one_that_is_not_there_is_one_line(lines: str, name: str, says: str) -> None:
+    told = CliRunner().invoke(app, ["check-planner", name])
+    assert told.exit_code == 2 and says in told.output and len(told.output.splitlines()) == 1
+
+
+def test_a_package_may_register_a_name(lines: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "lines-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: lines\nVersion: 1.0\n")
+    (folder / "entry_points.txt").write_text("[rover_companion.planners]\nlines = lines:Lines\n")
+    with pytest.raises(UnknownPlannerError):
+        make_planner("lines", PlannerSettings())
+    monkeypatch.syspath_prepend(str(tmp_path))
+    planner: Planner = make_planner("lines", PlannerSettings())
+    assert planner.name == "lines"
+    with pytest.raises(UnknownPlannerError, match=r"did you mean 'lines'"):
+        make_planner("liness", PlannerSettings())
+
+
+def test_the_controller_of_the_page_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    dice = written("planners.md", "Dice", tmp_path, monkeypatch)
+    settings = tmp_path / "dice.toml"
+    settings.write_text(f'guidance.controller = "{dice}"\n')
+    mission = ["drive", str(MAPS.parent / "first-drive" / "gate.toml"), "--settings", str(settings)]
+    driven = CliRunner().invoke(sitl, [*mission, "--record", "rec"])
+    assert driven.exit_code == 0, driven.output
+    replayed = CliRunner().invoke(app, ["replay", "rec"])
+    assert replayed.exit_code == 0 and "differences: none" in replayed.output, replayed.output
+    settings.write_text('guidance.controller = "dice:Nothing"\n')
+    told = CliRunner().invoke(sitl, mission)
+    assert told.exit_code == 2 and told.output.strip() == (
+        f"{settings}: guidance.controller: controller 'dice:Nothing' cannot be loaded: AttributeError: "
+        "module 'dice' has no attribute 'Nothing'"
+    )
+    settings.write_text('guidance.controller = "motion-gb"\n')
+    told = CliRunner().invoke(sitl, mission)
+    assert told.exit_code == 2 and "unknown controller 'motion-gb', did you mean 'motion-ga'?" in told.output
+
+
+def test_the_world_of_the_page_has_a_way_and_is_driven(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    orchard = written("worlds.md", "Orchard", tmp_path, monkeypatch)
+    make = ["world", "make", orchard, "--out", "worlds"]
+    made = CliRunner().invoke(sitl, [*make, "--set", "row_m=3", "--seed", "1"])
+    assert made.exit_code == 0, made.output
+    assert load_mission(tmp_path / "worlds" / "orchard-Orchard-1.toml").targets
+    told = CliRunner().invoke(sitl, [*make, "--set", "row_m=1"])
+    assert told.exit_code == 2 and "row_m" in told.output and len(told.output.strip().splitlines()) == 1
+    told = CliRunner().invoke(sitl, ["world", "make", "orchard:np"])
+    assert told.exit_code == 2 and "world 'orchard:np'" in told.output
+    told = CliRunner().invoke(sitl, ["world", "make", "mase"])
+    assert told.exit_code == 2 and "did you mean 'maze'?" in told.output
+    ground = GroundSpec.of(f"{orchard} row_m=5 movers=1")
+    assert ground is not None and (ground.kind, ground.given.model_dump()) == (orchard, {"row_m": 5.0})
+    source = Path("orchard.py").read_text(encoding="utf-8")
+    Path("orchard.py").write_text(source.replace("return solid", "return solid[1:]"), encoding="utf-8")
+    monkeypatch.delitem(sys.modules, "orchard")
+    with pytest.raises(OwnPartError, match="begin with empty"):
+        ground_of(orchard, 1)
