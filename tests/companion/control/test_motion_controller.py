@@ -18,7 +18,7 @@ from companion.control.motion_controller import (
     rover_model,
 )
 from companion.control.motion_kernels import clearance_m, moved
-from companion.control.motion_planners import MotionKind, motion_planner
+from companion.control.motion_planners import motion_planner
 from companion.control.reference_path import ReferencePath, advanced
 from companion.control.told import Told, ToldVelocity, after
 from companion.core.footprint import Footprint
@@ -42,7 +42,7 @@ def view(evidence: EvidenceMap, pose: Pose, speed_m_s: float = 0.0, settings: Se
 
 
 def controller(seed: int = 0) -> MotionController:
-    return MotionController(FOOTPRINT, motion_planner(MotionKind.GA, seed))
+    return MotionController(FOOTPRINT, motion_planner("motion-ga", seed))
 
 
 def driven(
