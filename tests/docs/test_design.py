@@ -28,9 +28,15 @@ def normal(text: str) -> str:
     return re.sub(r"[\s_-]+", " ", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", text)).lower()
 
 
+@functools.cache
+def stem_of(path: str) -> str:
+    """The normal name of a module, in the singular."""
+    return normal(Path(path).stem).removesuffix("s")
+
+
 def defined(source: str) -> set[str]:
     """The normal names of all classes of a module."""
-    return {normal(node.name) for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)}
+    return {normal(name) for name in re.findall(r"^ *class (\w+)", source, re.MULTILINE)}
 
 
 def test_the_layout_and_the_nouns_are_those_of_the_modules(made: dict[str, Any]) -> None:
@@ -63,8 +69,8 @@ def misplaced(module: Any, sources: dict[str, str], classes: dict[str, set[str]]
     said = own_words(module.path, sources[module.path])
     wrong = [noun for noun in module.nouns if normal(noun) not in said]
     for noun in set(module.nouns) - set(wrong):
-        homes = {path for path, names in classes.items() if normal(noun) in names}
-        homes |= {path for path in classes if normal(Path(path).stem).removesuffix("s") == normal(noun)}
+        name = normal(noun)
+        homes = {path for path, names in classes.items() if name in names or stem_of(path) == name}
         homes = {path for path in homes if path.partition("/")[0] == module.path.partition("/")[0]}
         wrong += [noun] if homes and not any(module.path.startswith(home) for home in homes) else []
     return wrong

@@ -11,6 +11,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from companion.cli.commands import app as companion
+from companion.recording.contacts import contacts_of
 from sitl.cli.commands import app
 from tests.support.reports import report_data_in
 
@@ -64,7 +65,9 @@ def test_in_lines_table_figures_record_and_picture(tmp_path: Path, monkeypatch: 
     assert replayed.exit_code == 0 and told in replayed.output
     for text in ("[1]", "{}", '[{"time_s": "x", "north_m": 0, "east_m": 0, "speed_m_s": 0, "with": 3}]'):
         Path("run/collisions.json").write_text(text)
-        assert "collisions.json: cannot be read" in CliRunner().invoke(companion, ["replay", "run"]).output
+        with pytest.raises(ValueError, match="validation error"):
+            contacts_of(Path("run"))
+    assert "collisions.json: cannot be read" in CliRunner().invoke(companion, ["replay", "run"]).output
     line = (
         f"collision 1: the rover, driving {contact['speed_m_s']:.1f} m/s, touched an obstacle "
         f"at {contact['time_s']:.1f} s"
