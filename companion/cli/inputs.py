@@ -10,9 +10,10 @@ from typing import Annotated
 
 import typer
 
-from companion.core.own_parts import OwnKind, OwnPartError, own_part
+from companion.core.own_parts import OwnPartError
+from companion.executive.controller_choice import check_controller
 from companion.planning.registry import UnknownPlannerError, make_planner
-from companion.settings import CONTROLLERS, Settings, SettingsError, load_settings
+from companion.settings import Settings, SettingsError, load_settings
 from companion.storage.files import refuse_pipe
 
 EXIT_BAD_INPUT = 2
@@ -45,12 +46,10 @@ def usable_settings(path: Path | None) -> Settings:
         make_planner(settings.navigator.planner, settings.planner)
     except UnknownPlannerError as error:
         raise SettingsError(f"{path}: navigator.planner: {error}") from error
-    controller = settings.guidance.controller
-    if controller not in CONTROLLERS:
-        try:
-            own_part(OwnKind.CONTROLLER, controller)
-        except OwnPartError as error:
-            raise SettingsError(f"{path}: guidance.controller: {error}") from error
+    try:
+        check_controller(settings.guidance.controller)
+    except OwnPartError as error:
+        raise SettingsError(f"{path}: guidance.controller: {error}") from error
     return settings
 
 

@@ -5,7 +5,7 @@ is told, and closes it slowly, also when it is told to stop. Where such ground e
 it is held, the more room its positions get and the sooner it brakes.
 
 A rover that such ground holds rolls on for seconds after it was told to stand, until the throttle is closed. Told to
-roll back, it closes it several times as fast.
+roll back, it stands after half the way.
 
 Nouns: drag watch.
 """
@@ -26,9 +26,11 @@ SLACK_M_S = 0.3
 FORGOTTEN_S = 0.5
 """What it was held by falls off with this time constant: the throttle is read ten times a second."""
 HELD_M_S = 0.2
+"""A rover that is held by less stands soon enough."""
 ROLLS_M_S = 0.1
 """Below it ArduRover closes the throttle of a rover that is told to stand (ATC_STOP_SPEED as shipped)."""
 BACK_M_S = (1.0, 0.5, 0.25)
+"""How fast it is told to roll back, tried in turn. Slower ones brake less, faster ones no better."""
 STALE_S = 0.5
 """An older reading of the throttle says nothing."""
 

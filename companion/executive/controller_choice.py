@@ -5,6 +5,7 @@ Nouns: controller in force.
 
 from __future__ import annotations
 
+from companion.control.motion_planners import motion_planner
 from companion.core.scan import RangeScan
 from companion.settings import ControllerKind, Settings
 from companion.settings.settings_file import by_points
@@ -25,3 +26,9 @@ def settings_in_force(settings: Settings, scan: RangeScan | None, turning_radius
     chosen = settings.guidance.controller
     kind = controller_in_force(chosen, narrow_sight=narrow, turning_radius_m=turning_radius_m)
     return settings if kind == chosen else by_points(settings)
+
+
+def check_controller(kind: ControllerKind) -> None:
+    """Raises OwnPartError for a controller of one's own that cannot be used."""
+    if kind != "points":
+        motion_planner(kind)

@@ -97,7 +97,7 @@ class MappingSettings(Section):
 CONTROLLERS = ("points", "motion-ga", "dwa", "mppi")
 
 
-def _there_is(name: str) -> str:
+def _known_controller(name: str) -> str:
     if name in CONTROLLERS or looks_own(OwnKind.CONTROLLER, name):
         return name
     known = (*CONTROLLERS, *registered(OwnKind.CONTROLLER))
@@ -106,7 +106,7 @@ def _there_is(name: str) -> str:
     raise ValueError(f"unknown controller {name!r:.80}{hint} known: {', '.join(known)}")
 
 
-ControllerKind = Annotated[str, AfterValidator(_there_is)]
+ControllerKind = Annotated[str, AfterValidator(_known_controller)]
 """One of ``CONTROLLERS``, or one's own."""
 
 

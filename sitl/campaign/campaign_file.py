@@ -13,11 +13,11 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from companion.control.motion_planners import motion_planner
 from companion.core.own_parts import OwnPartError
+from companion.executive.controller_choice import check_controller
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings, Settings, SettingsError
-from companion.settings.settings import CONTROLLERS, ControllerKind
+from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
 from companion.storage.toml_file import read_table
 from sitl.campaign.worded import NOTHING, OWN, GroundSpec, SensorSpec, faults_of
@@ -125,8 +125,7 @@ def _check_names(path: Path, table: CampaignTable) -> None:
             raise CampaignError(f"{path}: planners {number}: {error}") from error
     for number, name in enumerate(table.controllers, 1):
         try:
-            if name not in CONTROLLERS:
-                motion_planner(name)
+            check_controller(name)
         except OwnPartError as error:
             raise CampaignError(f"{path}: controllers {number}: {error}") from error
     for name, values in table.settings.items():

@@ -21,8 +21,6 @@ from companion.core.own_parts import OwnKind, OwnPartError, looks_own, source_of
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
-from companion.planning.registry import PLANNERS
-from companion.settings.settings import CONTROLLERS
 from companion.storage.files import read_at_most
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.policies import ERROR
@@ -103,14 +101,12 @@ class Digests:
 
 
 def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
-    if GroundSpec.of(spec.world) is None:
+    ground = GroundSpec.of(spec.world)
+    if ground is None:
         yield from load_mission(folder / spec.world).files
-    own = (
-        (OwnKind.PLANNER, spec.planner, spec.planner in PLANNERS),
-        (OwnKind.CONTROLLER, spec.controller, spec.controller in CONTROLLERS),
-        (OwnKind.WORLD, spec.world.partition(" ")[0], "/" in spec.world),
-    )
-    sources = [source_of(kind, name) for kind, name, shipped in own if not shipped and looks_own(kind, name)]
+    parts = [(OwnKind.PLANNER, spec.planner), (OwnKind.CONTROLLER, spec.controller)]
+    parts += [] if ground is None else [(OwnKind.WORLD, ground.kind)]
+    sources = [source_of(kind, name) for kind, name in parts if looks_own(kind, name)]
     yield from (folder / name for name in (spec.faults, SensorSpec.of(spec.sensors).name) if name.endswith(".toml"))
     yield from (source for source in sources if source is not None)
 

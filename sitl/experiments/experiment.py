@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from rich.table import Table
 
-from companion.control.motion_planners import motion_planner
 from companion.core.grid import Cell, Grid
-from companion.core.own_parts import OwnPartError
+from companion.core.own_parts import OwnKind, OwnPartError, looks_own
+from companion.executive.controller_choice import check_controller
 from companion.mapping.map_files import load_map
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings
@@ -103,17 +103,17 @@ class Options:
 def chosen_controllers(options: Options, otherwise: tuple[ControllerKind, ...]) -> tuple[ControllerKind, ...]:
     """The controllers that were asked for, or others. Raises ExperimentError for one that does not exist."""
     for name in options.controllers:
-        if name not in CONTROLLERS and ":" not in name:
+        if name not in CONTROLLERS and not looks_own(OwnKind.CONTROLLER, name):
             raise ExperimentError(
                 f"--controllers: {name!r:.60} is unknown; known are {', '.join(CONTROLLERS)}, and module:name"
             )
         try:
-            if name not in CONTROLLERS:
-                motion_planner(name)
+            check_controller(name)
         except OwnPartError as error:
             raise ExperimentError(f"--controllers: {error}") from error
     asked = dict.fromkeys(options.controllers)
-    return (*(name for name in CONTROLLERS if name in asked), *(name for name in asked if ":" in name)) or otherwise
+    own = (name for name in asked if name not in CONTROLLERS)
+    return (*(name for name in CONTROLLERS if name in asked), *own) or otherwise
 
 
 class ExperimentReport(ABC):

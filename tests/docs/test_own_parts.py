@@ -104,6 +104,11 @@ def test_the_controller_of_the_page_drives(tmp_path: Path, monkeypatch: pytest.M
         f"{settings}: guidance.controller: controller 'dice:Nothing' cannot be loaded: AttributeError: "
         "module 'dice' has no attribute 'Nothing'"
     )
+    source = Path("dice.py").read_text(encoding="utf-8")
+    Path("half.py").write_text(source.replace("def forget", "def forgets"), encoding="utf-8")
+    settings.write_text('guidance.controller = "half:Dice"\n')
+    told = CliRunner().invoke(sitl, mission)
+    assert told.exit_code == 2 and "controller 'half:Dice' has no forget" in told.output
     settings.write_text('guidance.controller = "motion-gb"\n')
     told = CliRunner().invoke(sitl, mission)
     assert told.exit_code == 2 and "unknown controller 'motion-gb', did you mean 'motion-ga'?" in told.output
