@@ -140,6 +140,20 @@ def advanced(path: ReferencePath, pose: Pose, window_m: float = 4.0) -> Referenc
     return ReferencePath(path.points, path.progress + nearest, path.speeds_m_s)
 
 
+def narrowest_ahead(
+    path: ReferencePath, evidence: EvidenceMap, within_m: float, reach_m: float
+) -> tuple[float, NedPoint]:
+    """The place with the least room round it among the next ``within_m`` of the path, and that room, in metres.
+
+    Room is looked for up to ``reach_m``. The place where the rover is does not count, but at the path's end.
+    """
+    first = min(path.progress + 1, len(path.points) - 1)
+    stop = max(first + 1, min(path.progress + round(within_m / STEP_M), len(path.points) - 1) + 1)
+    places = [path.point(i) for i in range(first, stop)]
+    rooms_m = [clearance_m(evidence, place, reach_m) for place in places]
+    return min(rooms_m), places[int(np.argmin(rooms_m))]
+
+
 def with_planned_speeds(path: ReferencePath, planned: Path, resolution_m: float) -> ReferencePath:
     """The path with the speeds of its plan, each at its share of the whole length; unchanged without any."""
     if planned.curve is None or planned.speeds_fields_s is None or len(planned.speeds_fields_s) == 0:

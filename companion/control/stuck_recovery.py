@@ -1,5 +1,8 @@
 """Stuck recovery: notices that the rover makes no progress, backs it out, and marks the place as costly.
 
+A rover that stands is stuck soon. One that goes to and fro before a gap which it hardly fits through moves all the
+time: it is stuck when it has not left a circle for a time that grows with the circle.
+
 Nouns: stuck recovery.
 """
 
@@ -12,7 +15,6 @@ from companion.control.controller import STANDSTILL, ControlCommand, Purpose
 from companion.control.local_view import LocalView
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
-from companion.core.grid import Cell
 from companion.mapping.evidence_map import penalise
 from companion.vehicle.commands import GuidedVelocity
 
@@ -21,6 +23,11 @@ TURNED_RAD = math.radians(15.0)
 FRESH_PENALTY = 0.15
 FINAL_PENALTY = 1.0
 TRIES_AT_ONE_PLACE = 3
+SAME_PLACE_M = 0.5
+"""Places nearer to each other than this count as one."""
+CIRCLES_M = (1.0, 2.0, 4.0)
+LINGERS_PER_M = 4.0
+"""In a circle the rover may stay for so many times ``stuck_after_s`` for each metre of its radius."""
 TURNS_RAD_S = 0.3
 """A rover that turns slower goes back straight."""
 
@@ -35,23 +42,39 @@ class Progress:
 
 
 class StuckRecovery:
-    """Watches one rover on one map, and remembers the fields before which it was stuck."""
+    """Watches one rover on one map, and remembers the places before which it was stuck."""
 
     def __init__(self) -> None:
         self._progress: Progress | None = None
+        self._centres: dict[float, Pose] = {}  # of the circles, by radius
         self._back_until_s = -math.inf
-        self._stuck_places: dict[Cell, int] = {}
+        self._stuck_places: list[NedPoint] = []
 
     def begin(self, pose: Pose) -> None:
         """From here and now on progress is expected."""
         self._progress = Progress(pose, pose.time_s, pose.time_s)
+        self._centres = {}
 
     def pause(self) -> None:
         """The rover stands still for a good reason."""
         self._progress = None
+        self._centres = {}
 
     def is_stuck(self, view: LocalView, command: ControlCommand) -> bool:
-        """No movement (turning counts for a while) for ``stuck_after_s``; to be asked at every tick."""
+        """No movement (turning counts for a while) for ``stuck_after_s``, or to and fro; to be asked at every tick."""
+        stays = self._stays(view, command)
+        return self._lingers(view) or stays
+
+    def _lingers(self, view: LocalView) -> bool:
+        """Whether the rover has not left one of the circles in time."""
+        pose, limit_s = view.pose, LINGERS_PER_M * view.settings.guidance.stuck_after_s
+        for radius_m in CIRCLES_M:
+            centre = self._centres.get(radius_m)
+            if centre is None or pose.point.distance_m(centre.point) >= radius_m:
+                self._centres[radius_m] = pose
+        return any(pose.time_s - centre.time_s >= limit_s * radius_m for radius_m, centre in self._centres.items())
+
+    def _stays(self, view: LocalView, command: ControlCommand) -> bool:
         pose, last = view.pose, self._progress
         if last is None or pose.point.distance_m(last.pose.point) >= MOVED_M:
             self._progress = Progress(pose, pose.time_s, pose.time_s)
@@ -66,12 +89,12 @@ class StuckRecovery:
     def back_out(self, view: LocalView, ahead: NedPoint) -> None:
         """Remember the place ahead as costly, in the end as an obstacle, and from now on back out."""
         settings = view.settings.guidance
-        cell = view.evidence.base.cell_at(ahead)
-        self._stuck_places[cell] = self._stuck_places.get(cell, 0) + 1
-        final = self._stuck_places[cell] >= TRIES_AT_ONE_PLACE
-        penalise(view.evidence, cell, FINAL_PENALTY if final else FRESH_PENALTY)
+        self._stuck_places.append(ahead)
+        tries = sum(place.distance_m(ahead) <= SAME_PLACE_M for place in self._stuck_places)
+        final = tries >= TRIES_AT_ONE_PLACE
+        penalise(view.evidence, view.evidence.base.cell_at(ahead), FINAL_PENALTY if final else FRESH_PENALTY)
         self._back_until_s = view.pose.time_s + settings.back_out_m / settings.back_out_speed_m_s
-        self._progress = None
+        self.pause()
 
     def is_backing(self, now_s: float) -> bool:
         """Whether the rover is being backed out."""

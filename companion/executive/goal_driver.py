@@ -16,7 +16,7 @@ from companion.control.local_view import LocalView
 from companion.control.motion_controller import MotionController
 from companion.control.motion_planners import motion_planner
 from companion.control.point_controller import PointController
-from companion.control.reference_path import ReferencePath, advanced, reference_path
+from companion.control.reference_path import ReferencePath, advanced, narrowest_ahead, reference_path
 from companion.control.stuck_recovery import StuckRecovery
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
@@ -48,6 +48,8 @@ from companion.planning.problem import PlanResult
 from companion.settings import ControllerKind
 
 DOUBT_REACH_M = 2.5
+NARROW_WITHIN_M, NARROW_ASIDE_M = 2.0, 0.3
+"""A stuck rover takes for the cause the narrowest place so near ahead, if there is less room than this aside."""
 
 
 @dataclass
@@ -346,8 +348,12 @@ class GoalDriver:
         self.decision = None
 
     def _place_ahead(self, view: LocalView) -> NedPoint:
-        """A field's side ahead, along the path if there is one."""
+        """The narrowest place soon to come on the path; a field's side ahead where none is narrow."""
         pose, side_m = view.pose, view.evidence.base.resolution_m
         if self.path is None:
             return pose.point.moved(pose.heading_rad, side_m)
+        narrow_m = view.rover.radius_m + NARROW_ASIDE_M
+        room_m, place = narrowest_ahead(self.path, view.evidence, NARROW_WITHIN_M, narrow_m)
+        if room_m < narrow_m:
+            return place
         return pose.point.moved(pose.point.bearing_rad(self.path.point_ahead(side_m)), side_m)

@@ -9,6 +9,7 @@ from companion.control.reference_path import (
     STEP_M,
     ReferencePath,
     advanced,
+    narrowest_ahead,
     path_along_curve,
     path_along_fields,
     path_is_clear,
@@ -76,3 +77,16 @@ def test_a_path_is_clear_until_something_stands_in_it():
     assert not path_is_clear(northward(blocked), blocked.map, 0.35)
     beside = looked([(14.5, 11.6, 0.2)])
     assert path_is_clear(northward(beside), beside.map, 0.35) and not path_is_clear(northward(beside), beside.map, 1.2)
+
+
+def test_the_narrowest_place_ahead_is_between_the_posts_and_only_what_is_near_counts():
+    evidence = looked([(13.0, 10.0, 0.1), (13.0, 11.0, 0.1), (16.0, 10.4, 0.1)]).map
+    path = path_along_fields(evidence.base, NORTH, HERE.point, END)
+    room_m, place = narrowest_ahead(path, evidence, 4.0, 1.0)
+    assert place.distance_m(NedPoint(13.0, 10.5)) <= STEP_M and 0.2 < room_m < 0.7
+    nothing_m, _ = narrowest_ahead(path, evidence, 1.0, 1.0)
+    assert nothing_m == 1.0
+    room_m, place = narrowest_ahead(path, evidence, 20.0, 1.0)
+    assert place.distance_m(NedPoint(16.0, 10.4)) < 0.5 and room_m < 0.3
+    at_the_end = ReferencePath(path.points, len(path.points) - 1)
+    assert narrowest_ahead(at_the_end, evidence, 2.0, 1.0)[1] == path.end

@@ -7,7 +7,16 @@ import pytest
 
 from companion.control.controller import STANDSTILL, ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
-from companion.control.stuck_recovery import FRESH_PENALTY, MOVED_M, TRIES_AT_ONE_PLACE, TURNED_RAD, StuckRecovery
+from companion.control.stuck_recovery import (
+    CIRCLES_M,
+    FRESH_PENALTY,
+    LINGERS_PER_M,
+    MOVED_M,
+    SAME_PLACE_M,
+    TRIES_AT_ONE_PLACE,
+    TURNED_RAD,
+    StuckRecovery,
+)
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -55,6 +64,21 @@ def test_moving_on_counts_from_anew_and_turning_counts_for_a_while() -> None:
     turning, ticks = watching(), [i * 0.5 * LIMIT_S for i in range(1, 7)]
     stuck = [turning.is_stuck(view(time_s, turned=i % 2 * TURNED_RAD), DRIVE) for i, time_s in enumerate(ticks, 1)]
     assert stuck == [False] * 5 + [True], "turning to and fro is no progress in the end"
+
+
+@pytest.mark.parametrize("radius_m", CIRCLES_M)
+def test_a_rover_that_goes_to_and_fro_is_stuck_when_it_does_not_leave_a_circle_in_time(radius_m: float) -> None:
+    def stuck_after_s(reach_m: float, until_s: float) -> float:
+        recovery, evidence = watching(), seen_map()
+        for tick in range(1, int(until_s)):
+            north_m = 10.5 + reach_m * abs((tick / 10.0) % 2.0 - 1.0)
+            if recovery.is_stuck(view(float(tick), evidence, north_m), DRIVE):
+                return float(tick)
+        return math.inf
+
+    allowed_s = LINGERS_PER_M * LIMIT_S * radius_m
+    assert allowed_s <= stuck_after_s(0.95 * radius_m, 2.0 * allowed_s) <= allowed_s + 2.0
+    assert stuck_after_s(2.0 * max(CIRCLES_M) + 0.1, 10.0 * allowed_s) == math.inf, "far to and fro is on its way"
 
 
 def test_a_pause_does_not_count() -> None:
@@ -110,3 +134,13 @@ def test_a_place_grows_costly_and_in_the_end_closed() -> None:
     recovery.back_out(view(9.0, evidence), AHEAD)
     assert evidence.grid.is_obstacle(field)
     assert math.isclose(float(evidence.penalty.sum()), float(evidence.penalty[field.y, field.x])), "it alone"
+
+
+def test_places_near_one_another_count_as_one() -> None:
+    recovery, evidence = watching(), seen_map()
+    for tries in range(TRIES_AT_ONE_PLACE):
+        recovery.back_out(view(float(tries), evidence), NedPoint(11.95 + tries * 0.1, 10.5))
+    assert evidence.grid.is_obstacle(evidence.base.cell_at(NedPoint(12.1, 10.5))), "the last one is closed"
+    assert not evidence.grid.is_obstacle(evidence.base.cell_at(NedPoint(11.95, 10.5)))
+    recovery.back_out(view(9.0, evidence), NedPoint(12.15 + SAME_PLACE_M + 0.1, 10.5))
+    assert not evidence.grid.is_obstacle(evidence.base.cell_at(NedPoint(12.8, 9.4))), "another place"

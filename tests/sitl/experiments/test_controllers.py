@@ -8,6 +8,7 @@ import pytest
 from sitl.experiments.controllers import (
     ControllersReport,
     GroundDrive,
+    drive,
     mission_on,
     ratio_with_interval,
     run,
@@ -74,3 +75,12 @@ def test_the_interval_holds_the_ratio_and_grows_with_scatter() -> None:
 def test_an_unknown_controller_is_refused() -> None:
     with pytest.raises(ExperimentError, match="--controllers: 'teleport' is unknown"):
         run(Options(controllers=("teleport",)), lambda done, total: None)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("controller", ["motion-ga", "mppi"])
+def test_a_rover_that_drove_to_and_fro_at_a_door_of_its_own_width_finds_the_other_way(controller: str) -> None:
+    """A wall stands in the door of this ground and leaves 0.8 m; both drove there until the time was over."""
+    there = drive(GroundKind.ROOMS, controller, 11)
+    assert there.reached and there.contacts == 0 and there.refused == 0
+    assert there.seconds < 300.0
