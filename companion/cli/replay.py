@@ -10,6 +10,7 @@ import typer
 
 from companion.cli.images import save_decision, save_motions
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture
+from companion.cli.replay_progress import watched_replay
 from companion.mapping.map_files import MapError
 from companion.recording.contacts import COLLISIONS, contacts_of
 from companion.recording.reader import Record, load_record
@@ -18,7 +19,6 @@ from companion.recording.record_format import RecordError
 from companion.replay.decision_list import DecisionLister, decision_at, list_lines
 from companion.replay.explain import DecisionExplainer, Explanation, explanation_lines
 from companion.replay.replay import ReplayResult
-from companion.replay.replay import replay as run_again
 
 EXIT_SAME, EXIT_DIFFERENT = 0, 1
 SHOWN = 20
@@ -56,7 +56,7 @@ def replay(
         elif why is not None:
             result = _explained(record, why, image)
         else:
-            result = run_again(record)
+            result = watched_replay(record)
     except (RecordError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -69,7 +69,7 @@ def replay(
 def _listed(record: Record) -> ReplayResult:
     """Replay, and print the list of decisions."""
     clock, lister = record_clock(record), DecisionLister()
-    result = run_again(record, lister)
+    result = watched_replay(record, lister)
     with contextlib.suppress(OSError, ValueError):  # a file that cannot be read is told after the list
         lister.add_contacts(contacts_of(record.directory), clock)
     typer.echo(f"{record.directory}: {clock.described}")
@@ -84,7 +84,7 @@ def _explained(record: Record, why: str, image: Path | None) -> ReplayResult:
     image = image or record.directory / f"why-{number}.png"
     picture(image)
     explainer = DecisionExplainer(number, record.settings, record.mission.rover.turning_radius_m)
-    result = run_again(record, explainer)
+    result = watched_replay(record, explainer)
     if explainer.explanation is None:
         raise RecordError(f"{record.directory}: what is left of it ends before decision {number}")
     _explain(explainer.explanation, image)

@@ -14,11 +14,12 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, writable, written
+from companion.cli.replay_progress import watched_replay
 from companion.mapping.map_files import MapError
 from companion.recording.reader import Record, files_of, load_record
 from companion.recording.record_clock import record_clock
 from companion.recording.record_format import RecordError
-from companion.replay.replay import Observers, ReplayObserver, ReplayResult, replay
+from companion.replay.replay import ReplayObserver, ReplayResult
 from companion.viewer.report_csv import FILES, CsvReport
 from companion.viewer.report_data import ReportWatch, as_json, counted, joined, named, run_of
 from companion.viewer.report_film import Film, FilmError, check_ffmpeg, write_gif, write_mp4
@@ -139,7 +140,7 @@ def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
             messages = McapReport(forms.mcap, clock)
             stack.callback(messages.close)
             observers.append(messages)
-        result = replay(first, Observers(observers))
+        result = watched_replay(first, *observers)
         _refuse_silent(first, result)
     runs = named([run_of(first, tally, result), *(counted(one) for one in records[1:])])
     if forms.csv is not None:
@@ -171,7 +172,7 @@ def write_report(record: Record, file: Path) -> str:
     Raises RecordError, MapError, OutputError.
     """
     tally, watched = RunTally(), ReportWatch(record)
-    result = replay(record, Observers([tally, watched]))
+    result = watched_replay(record, tally, watched)
     _refuse_silent(record, result)
     run = named([run_of(record, tally, result)])[0]
     return _page_written(record, joined(record, watched, run, []), file)

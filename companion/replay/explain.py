@@ -17,7 +17,7 @@ from companion.app import Companion
 from companion.control.motion_controller import MotionChoice, MotionController
 from companion.control.motion_kernels import BLOCKED_S, way_of
 from companion.core.frames import Pose
-from companion.core.grid import Grid
+from companion.core.grid import OBSTACLE, Grid
 from companion.mapping.evidence_map import known_fields
 from companion.navigation.field_step import Decision, NavState, follows_clear_path
 from companion.navigation.turning_cost import with_turning_cost
@@ -234,7 +234,8 @@ def explanation_lines(why: Explanation) -> list[str]:
         f"{math.degrees(pose.heading_rad) % 360.0:.0f} deg), last step in {here.x}, {here.y}; "
         f"target field {goal.x}, {goal.y}; {len(why.state.past)} fields of past path{returning}",
         f"map: {why.grid.width} x {why.grid.height} fields of {why.grid.resolution_m:g} m, "
-        f"{why.known.mean():.0%} seen, {int((why.grid.weights >= 1.0).sum())} are obstacles",
+        f"{np.count_nonzero(why.known) / why.known.size:.0%} seen, "
+        f"{np.count_nonzero(why.grid.weights >= OBSTACLE)} are obstacles",
     ]
     for candidate in why.candidates:
         lines.append(

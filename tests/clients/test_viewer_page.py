@@ -119,6 +119,14 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows(f"Driving to {name}", "Enter token to act")
             program.child.send_signal(signal.SIGINT)
             desktop.shows("Stopped by the user")
+            program.ended()
+            port = address.rstrip("/").rpartition(":")[2]
+            next_one = ("sitl", "drive", MISSIONS / "open.toml", "--web", port, "--speedup", "1")
+            with ours(tmp_path, *next_one) as another:
+                address_of(another)
+                desktop.shows("Open ground", "Driving to half way")
+                assert name not in desktop.text, "nothing of the run before is left"
+                another.child.send_signal(signal.SIGINT)
 
 
 def fits(shown: Page, size: tuple[int, int]) -> None:

@@ -47,7 +47,9 @@ def test_the_depot_is_driven_without_a_collision(sensors: str, tmp_path: Path) -
     assert (tmp_path / "depot.png").stat().st_size > 20_000
 
 
-@pytest.mark.parametrize(("material", "collisions"), [("solid", 0), ("glass", 1), ("black", 1)])
+@pytest.mark.parametrize(
+    ("material", "collisions"), [("solid", 0), ("glass", 1), pytest.param("black", 1, marks=pytest.mark.thorough)]
+)
 def test_what_sends_no_ray_back_is_not_seen_until_it_is_touched(material: str, collisions: int, tmp_path: Path) -> None:
     (tmp_path / "world.toml").write_text(
         "size_m = [20.0, 15.0]\n[[obstacle]]\nline_m = [[5.0, 10.0], [10.0, 10.0]]\nwidth_m = 0.2\n"

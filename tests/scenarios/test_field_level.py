@@ -21,6 +21,7 @@ def experiment(*arguments: str) -> str:
     return result.output
 
 
+@pytest.mark.thorough
 def test_the_unknown_maps(tmp_path):
     """One test, so that one worker makes them, once."""
     file, docs = tmp_path / "out.json", tmp_path / "docs"

@@ -243,6 +243,7 @@ def test_a_companion_that_is_killed_round_a_step_goes_on(tmp_path: Path, after_s
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 def test_a_run_with_steps_is_replayed_without_a_difference(tmp_path: Path) -> None:
     path = recorded(tmp_path / "record", yard(tmp_path), "rtk", settings=GATED)
     result = replay(load_record(path))

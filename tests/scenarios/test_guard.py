@@ -55,6 +55,7 @@ def test_with_a_guard_a_dead_companions_rover_stands_soon_and_touches_nothing(gu
     assert max(death.went_s for death in deaths) < 3.5
 
 
+@pytest.mark.thorough
 def test_a_companion_that_comes_back_goes_on_from_the_guards_hold_without_a_person(guarded: Mission) -> None:
     drive = drive_with_deaths(guarded, Motors.OWN, 0, PLANNED)
     assert len(drive.deaths) >= 2

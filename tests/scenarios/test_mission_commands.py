@@ -79,6 +79,7 @@ def test_where_and_when_commands_are_given(tmp_path: Path) -> None:
     assert 1.0 < abs(gripper.north_m - door[0]) < 2.5, "on the way, two metres before the door"
 
 
+@pytest.mark.thorough
 def test_a_target_that_cannot_be_reached_gets_none_of_its_commands(tmp_path: Path) -> None:
     servo = '[[target.command]]\nname = "DO_SET_SERVO"\nparams = [9, 1900]\n'
     rig = Rig(yard(tmp_path, GATE + servo, sealed=True))

@@ -115,7 +115,14 @@ def test_a_rally_point_that_is_nearer_is_where_it_goes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "why", ["farther than home", "behind the fence", "switched off", "off the ground of the mission"]
+    "why",
+    [
+        "behind the fence",
+        *(
+            pytest.param(why, marks=pytest.mark.thorough)
+            for why in ("farther than home", "switched off", "off the ground of the mission")
+        ),
+    ],
 )
 def test_a_rally_point_that_will_not_do_is_passed_over(tmp_path: Path, why: str) -> None:
     place = {"farther than home": (0.0, 18.0), "off the ground of the mission": (0.0, 60.0)}.get(why, (5.0, 9.5))

@@ -131,6 +131,7 @@ def test_a_requested_goal_is_run_to_its_end_and_then_the_mission(tmp_path: Path)
     assert rig.companion.outcome.complete
 
 
+@pytest.mark.thorough
 def test_a_rover_on_its_way_back_goes_on_back(tmp_path: Path) -> None:
     targets = GATE + 'on_blocked = "return"\n'
     rig, mission = rig_of(tmp_path, targets, sealed=True)
@@ -220,7 +221,7 @@ def test_after_a_loss_of_power_it_arms_and_goes_on_where_it_was(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("alive", [True, False], ids=["before", "while it is dead"])
-@pytest.mark.parametrize("mode", [MANUAL, HOLD])
+@pytest.mark.parametrize("mode", [MANUAL, pytest.param(HOLD, marks=pytest.mark.thorough)])
 def test_a_rover_that_a_person_has_taken_stays_with_that_person(tmp_path: Path, mode: int, alive: bool) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(4.0)

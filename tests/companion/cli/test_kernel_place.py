@@ -144,6 +144,7 @@ def test_a_kernel_is_compiled_again_only_when_something_it_uses_has_changed(tmp_
     assert program.run() == (7.0, []), "as it was: still kept"
 
 
+@pytest.mark.thorough
 def test_a_package_that_cannot_be_written_is_compiled_once(tmp_path: Path) -> None:
     """If these tests run as root, the program lacks root's right to write everywhere; ``HOME`` does not exist."""
     program = Program(tmp_path / "site", tmp_path / "cache")
