@@ -1,7 +1,4 @@
-"""A replay for someone who waits at a terminal: with a line that shows how far it is.
-
-Nouns: none of its own.
-"""
+"""A replay for someone who waits at a terminal: with a line that shows how far it is."""
 
 from __future__ import annotations
 
