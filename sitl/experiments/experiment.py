@@ -86,6 +86,7 @@ class Options:
         chosen += "" if self.off == OFF_MODEL else f" --off {self.off:g}"
         chosen += f" --late {self.late_s:g}" if self.late_s else ""
         chosen += f" --worlds {self.archive.name}" if self.archive else ""
+        chosen += f" --maps {self.maps.name}" if self.maps else ""
         return f"rover-sitl experiment {name} --runs {self.runs} --seed {self.seed}{chosen} --docs docs"
 
     @property

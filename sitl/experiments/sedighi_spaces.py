@@ -7,6 +7,7 @@ by row and column by column; 07 and 08 need both in one path.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -158,3 +159,12 @@ def given_spaces(folder: Path) -> dict[str, PlanningProblem]:
     if not spaces:
         raise ExperimentError(f"{folder}: no grids (*.txt: the number of rows, then as many rows of 0 and 1)")
     return spaces
+
+
+def origin_of(folder: Path) -> str | None:
+    """The first web address in the folder's SOURCE.txt: where its grids come from."""
+    try:
+        text = read_at_most(folder / "SOURCE.txt", MOST_BYTES).decode("utf-8")
+    except (OSError, ValueError):
+        return None
+    return next(iter(re.findall(r"https?://[^\s)]+", text)), None)

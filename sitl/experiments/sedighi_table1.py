@@ -19,7 +19,7 @@ from sitl.experiments import drawing
 from sitl.experiments.experiment import Advance, ExperimentReport, Options, where_measured
 from sitl.experiments.monotone_reach import COLUMNS, ROWS, fewest_switches
 from sitl.experiments.results_page import markdown_table, terminal_table
-from sitl.experiments.sedighi_spaces import DRAWINGS, given_spaces, own_spaces
+from sitl.experiments.sedighi_spaces import DRAWINGS, given_spaces, origin_of, own_spaces
 
 NAME = "sedighi-table1"
 METHODS = ("geisler", "hermanu", "sedighi")
@@ -222,12 +222,22 @@ def _given(report: TableReport) -> str:
     if not names:
         return ""
     return f"""
-The same for grids given with `--maps FOLDER` (text files: the number of rows, then as many rows of 0 and 1):
+The same for the grids of `{_folder(report)}`{_origin(report)} (text files: the number of rows, then as many rows of 0
+and 1):
 
 {markdown_table(HEAD, report._success(names))}
 
 {markdown_table(TIME_HEAD, report._times(names))}
 {_never_found(report, names)}"""
+
+
+def _folder(report: TableReport) -> str:
+    return "" if report.options.maps is None else report.options.maps.name
+
+
+def _origin(report: TableReport) -> str:
+    address = None if report.options.maps is None else origin_of(report.options.maps)
+    return "" if address is None else f", from {address}"
 
 
 def _never_found(report: TableReport, names: dict[str, PlanningProblem]) -> str:
@@ -248,8 +258,7 @@ def _section(report: TableReport) -> str:
     runs = len(report.entries[0].trials)
     return f"""## Search spaces (Sedighi et al. 2004, Table 1)
 
-`rover-sitl experiment {NAME} --runs {report.options.runs} --seed
-{report.options.seed}{" --maps FOLDER" if _given(report) else ""} --docs docs`
+`{report.options.command(NAME)}`
 
 From the upper left to the lower right corner, every planner with its default settings. Success in per cent: of the
 first {min(runs, PAPER_RUNS)} runs (the paper makes {PAPER_RUNS}), then of all {runs}, in brackets the paper's figure as

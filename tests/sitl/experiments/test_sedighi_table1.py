@@ -19,6 +19,7 @@ def grids(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "tiny.txt").write_text("3\n000\n110\n000", encoding="utf-8")
     (folder / "shut.txt").write_text("2\n01\n10", encoding="utf-8")
     (folder / "notes.txt").write_text("no grid", encoding="utf-8")
+    (folder / "SOURCE.txt").write_text("repo: https://example.org/grids  (tests/)", encoding="utf-8")
     return folder
 
 
@@ -44,6 +45,9 @@ def test_what_is_written(report: TableReport, tmp_path: Path):
     text = page.read_text(encoding="utf-8")
     assert picture.stat().st_size > 5000 and "73.3" in text and "tiny" in text
     assert all(name in text for name in (*METHODS, *PAPER_PERCENT))
+    folder = report.options.maps
+    assert folder is not None and f"--maps {folder.name} --docs" in text, "the command names the folder"
+    assert f"The same for the grids of `{folder.name}`, from https://example.org/grids (text files" in text
 
 
 def test_the_same_seeds_find_the_same_paths(report: TableReport, grids: Path):
