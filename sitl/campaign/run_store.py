@@ -79,11 +79,11 @@ class RunStore:
 
 
 class Digests:
-    """Names for the code as it stands and the files that a run depends on; each is read once."""
+    """Names for the code as it stands and the files that a run depends on; each is read once, when first asked for."""
 
     def __init__(self, folder: Path) -> None:
         """``folder``: of the campaign's file."""
-        self._folder = folder
+        self.folder = folder
         self._known: dict[tuple[str, ...], str] = {}
 
     def of(self, spec: RunSpec) -> str:
@@ -92,7 +92,7 @@ class Digests:
         if key not in self._known:
             digest = hashlib.sha256(code_digest().encode())
             try:
-                for file in _files(spec, self._folder):
+                for file in _files(spec, self.folder):
                     digest.update(file.name.encode() + read_at_most(file, MOST_BYTES))
                 self._known[key] = digest.hexdigest()[:16]
             except (OSError, MissionError, MapError, OwnPartError):

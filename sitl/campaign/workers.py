@@ -5,6 +5,7 @@ Nouns: worker.
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,24 +21,27 @@ RETRIES = 3
 another worker."""
 
 
-def driven_here(specs: Sequence[RunSpec], folder: Path, jobs: int) -> Done:
+def driven_here(specs: Sequence[RunSpec], digests: Digests, jobs: int) -> Done:
     """Each run with its result, as they are done.
 
-    Raises CampaignError if joblib is needed and not installed, and when a process was killed.
+    Raises CampaignError if joblib is needed and not installed, when a process was killed, and when a file of a run is
+    changed meanwhile.
     """
     if jobs == 1:
-        return ((spec, drive(spec, folder)) for spec in specs)
+        return (_checked(spec, digests.of(spec), digests.folder) for spec in specs)
     try:
         from joblib import Parallel, delayed
     except ImportError as error:
         raise CampaignError(
             f"--jobs {jobs}: joblib is not installed; install rover-companion[experiments], or leave the option out"
         ) from error
-    done: Done = Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_pair)(spec, folder) for spec in specs)
+    done: Done = Parallel(n_jobs=jobs, return_as="generator_unordered")(
+        delayed(_checked)(spec, digests.of(spec), digests.folder) for spec in specs
+    )
     return _told(done, "a process of --jobs has ended (for want of memory?)")
 
 
-def driven_on(specs: Sequence[RunSpec], folder: Path, address: str) -> Done:
+def driven_on(specs: Sequence[RunSpec], digests: Digests, address: str) -> Done:
     """The same by the workers of a dask scheduler. Each needs this version of the code, and the campaign's folder.
 
     Raises CampaignError when there is no scheduler, when a worker has other code or other files, and when workers keep
@@ -53,16 +57,17 @@ def driven_on(specs: Sequence[RunSpec], folder: Path, address: str) -> Done:
         client = Client(address, timeout="5s")
     except (OSError, ValueError) as error:
         raise CampaignError(f"--cluster {address}: nobody answers there; start one: dask scheduler") from error
-    return _told(_driven_by(client, specs, folder), f"--cluster {address}")
+    return _told(_driven_by(client, specs, digests), f"--cluster {address}")
 
 
-def _driven_by(client: Any, specs: Sequence[RunSpec], folder: Path) -> Done:
+def _driven_by(client: Any, specs: Sequence[RunSpec], digests: Digests) -> Done:
     from distributed import as_completed
 
-    digests = Digests(folder)
     with client:
         wanted = [digests.of(spec) for spec in specs]
-        futures = client.map(_checked, specs, wanted, folder=folder, retries=RETRIES, pure=False, batch_size=50)
+        futures = client.map(
+            _checked_on_a_worker, specs, wanted, folder=digests.folder, retries=RETRIES, pure=False, batch_size=50
+        )
         for future in as_completed(futures):
             yield future.result()
             future.release()
@@ -79,12 +84,24 @@ def _told(done: Done, what: str) -> Done:
         raise CampaignError(f"{what}: {text:.200}; what is done is kept, and the same command goes on") from error
 
 
-def _pair(spec: RunSpec, folder: Path) -> tuple[RunSpec, RunResult]:
-    return spec, drive(spec, folder)
-
-
 def _checked(spec: RunSpec, digest: str, folder: Path) -> tuple[RunSpec, RunResult]:
-    """A worker's. Raises CampaignError where its code or files are not those of the campaign."""
+    """A run, by the code and the files that the campaign began with. Raises CampaignError where they are others."""
+    result = drive(spec, folder)
     if Digests(folder).of(spec) != digest:
-        raise CampaignError(f"a worker has other code, or other files in {folder}; install the same version there")
-    return _pair(spec, folder)
+        raise CampaignError(
+            f"a file of the run was changed since the campaign began ({spec.world}, {spec.faults}, {spec.sensors}); "
+            "the same command drives again what that changes"
+        )
+    return spec, result
+
+
+def _checked_on_a_worker(spec: RunSpec, digest: str, folder: Path) -> tuple[RunSpec, RunResult]:
+    """The same on a worker of a cluster, which may have other code and other files from the start."""
+    from distributed import get_worker
+
+    if Digests(folder).of(spec) != digest:
+        raise CampaignError(
+            f"the worker {get_worker().address} on {socket.gethostname()} has other code, or other files in {folder}; "
+            "install the same version there"
+        )
+    return _checked(spec, digest, folder)

@@ -81,13 +81,14 @@ def drive_campaign(
     table, folder = load_campaign(file), file.resolve().parent
     place = out or Path("out") / table.name
     writable(place / FILE)
-    store = RunStore(place / FILE, Digests(folder).of)
+    digests = Digests(folder)
+    store = RunStore(place / FILE, digests.of)
     specs = list(specs_of(table))
     _say_what_there_is(store, specs)
     left = [spec for spec in specs if spec.id not in store.results]
     if left:
         check_all(left, folder)
-        _drive(console, left, store, folder, jobs, cluster)
+        _drive(console, left, store, digests, jobs, cluster)
     runs = store.of(specs)
     put_out(console, table, runs, file, place, parquet=parquet)
     errors = sum(result.outcome == ERROR for _, result in runs)
@@ -110,15 +111,15 @@ def _drive(
     console: Console,
     left: list[RunSpec],
     store: RunStore,
-    folder: Path,
+    digests: Digests,
     jobs: int,
     cluster: str | None,
 ) -> None:
     """All that is left. Ctrl-C ends it; what is done is kept."""
     if cluster is None:
-        warm_up_all(left, folder)
+        warm_up_all(left, digests.folder)
     before = len(store.results)
-    done: Done = driven_here(left, folder, jobs) if cluster is None else driven_on(left, folder, cluster)
+    done: Done = driven_here(left, digests, jobs) if cluster is None else driven_on(left, digests, cluster)
     try:
         with progress(console, len(left)) as advance:
             for spec, result in done:

@@ -27,12 +27,12 @@ MOST_MINIMISED = 20
 class _Driver:
     """Drives runs and keeps them, so that a search that was stopped goes on where it was."""
 
-    def __init__(self, store: RunStore, folder: Path, jobs: int) -> None:
-        self._store, self._folder, self._jobs = store, folder, jobs
+    def __init__(self, store: RunStore, digests: Digests, jobs: int) -> None:
+        self._store, self._digests, self._jobs = store, digests, jobs
 
     def __call__(self, specs: Sequence[RunSpec]) -> list[RunResult]:
         left = list({spec.id: spec for spec in specs if spec.id not in self._store.results}.values())
-        for spec, result in driven_here(left, self._folder, self._jobs if len(left) > 1 else 1):
+        for spec, result in driven_here(left, self._digests, self._jobs if len(left) > 1 else 1):
             with written(self._store.file):
                 self._store.add(spec, result)
         return [self._store.results[spec.id] for spec in specs]
@@ -43,11 +43,12 @@ def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs:
     table, folder, console = load_campaign(file), file.resolve().parent, Console()
     place = (out or Path("out") / table.name) / f"search-{goal}"
     writable(place / FILE)
-    store = RunStore(place / FILE, Digests(folder).of)
+    digests = Digests(folder)
+    store = RunStore(place / FILE, digests.of)
     bases = first_bases(table)
     check_all(bases, folder)
     warm_up_all(bases, folder)
-    drive, finds = _Driver(store, folder, jobs), list[Find]()
+    drive, finds = _Driver(store, digests, jobs), list[Find]()
     before = len(store.results)
     try:
         with progress(console, budget) as advance:
