@@ -7,6 +7,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from companion.app import Companion
 from companion.recording.reader import Record
+from companion.recording.record_clock import record_clock
 from companion.replay.replay import Observers, ReplayObserver, ReplayResult, replay
 
 STEP_S = 1.0
@@ -18,7 +19,7 @@ class _Shown(ReplayObserver):
 
     def __init__(self, progress: Progress, record: Record) -> None:
         self._progress = progress
-        self._task = progress.add_task(f"replaying {record.directory.name}", total=record.lasts_s)
+        self._task = progress.add_task(f"replaying {record.directory.name}", total=record_clock(record).length_s)
         self._next_s = 0.0
 
     def ticked(self, companion: Companion, time_s: float) -> None:

@@ -106,7 +106,9 @@ def report(
     if len(runs) > 1:
         _compare(runs)
     if show and page is not None:
-        webbrowser.open(page.resolve().as_uri())
+        address = page.resolve().as_uri()
+        if not webbrowser.open(address):
+            typer.echo(f"no browser was found on this computer; open {address}", err=True)
 
 
 def _check(records: Sequence[Record], forms: Forms) -> None:
@@ -142,7 +144,7 @@ def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
             observers.append(messages)
         result = watched_replay(first, *observers)
         _refuse_silent(first, result)
-    runs = named([run_of(first, tally, result), *(counted(one) for one in records[1:])])
+    runs = named([run_of(first, tally, result), *(counted(one, watched_replay) for one in records[1:])])
     if forms.csv is not None:
         typer.echo(f"tables: {forms.csv} ({', '.join(FILES)})")
     if forms.mcap is not None:

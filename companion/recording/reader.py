@@ -80,12 +80,6 @@ class Record:
         """The copy of a further file that the run depended on."""
         return next((self.directory / entry.name for entry in self.meta.inputs if entry.kind == kind), None)
 
-    @property
-    def lasts_s(self) -> float:
-        """From its first tick to its last. Raises RecordError if the file of ticks cannot be read."""
-        ticks, _ = unpacked_ticks(read_at_most(self.directory / TICKS, MAX_BYTES))
-        return ticks[-1].time_s - ticks[0].time_s if ticks else 0.0
-
     def ticks(self) -> Iterator[RecordedTick]:
         """The ticks in order, as far as both the tick and its packets are there.
 

@@ -19,8 +19,9 @@ SIMULATED_UNTIL_US = 1_600_000_000_000_000
 DAY_S = 86_400.0
 SHOWN_S = 0.006
 """Times are shown to a hundredth: one that was read off a list means the moment that was listed."""
-SECONDS = re.compile(r"(\d{1,9}(?:\.\d{1,9})?) ?s", re.ASCII)
-OF_DAY = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:\.\d{1,9})?))?", re.ASCII)
+SECONDS = re.compile(r"(\d{1,9}(?:\.\d{1,9})?) ?s|(\d{1,9}\.\d{1,9})", re.ASCII)
+"""A whole number without the s is that of a decision."""
+OF_DAY = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{1,2}(?:\.\d{1,9})?))?", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +57,8 @@ class RecordClock:
         return f"{np.datetime_as_string(np.datetime64(self.unix_us(since_s) + 500, 'us'), unit='ms')}Z"
 
     def time_of_day(self, since_s: float) -> str:
-        """Hours, minutes and seconds with hundredths."""
-        return str(np.datetime_as_string(np.datetime64(self.unix_us(since_s) + 5000, "us"), unit="ms"))[11:22]
+        """Hours, minutes and seconds with hundredths; a simulated day has nothing before its first packet."""
+        return str(np.datetime_as_string(np.datetime64(max(self.unix_us(since_s), 0) + 5000, "us"), unit="ms"))[11:22]
 
     def moment_s(self, text: str) -> float | None:
         """Seconds since the start, of a text like ``83.5s`` or ``14:03:22``; None for any other text.
@@ -65,7 +66,7 @@ class RecordClock:
         A time of day is the first one in the record; it may lie behind its end.
         """
         if found := SECONDS.fullmatch(text):
-            return float(found[1])
+            return float(found[1] or found[2])
         found = OF_DAY.fullmatch(text)
         hour, minute, second_s = (0, 0, 0.0) if found is None else (int(found[1]), int(found[2]), float(found[3] or 0))
         if found is None or hour > 23 or minute > 59 or second_s >= 60.0:

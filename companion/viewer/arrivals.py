@@ -25,6 +25,8 @@ class Arrivals:
             times_s = self._arrived[name]
             if seen is not None and (not times_s or seen.time_s != times_s[-1]):
                 times_s.append(seen.time_s)
+                while times_s[-1] - times_s[0] > RATE_S:  # nobody may ask for long
+                    times_s.popleft()
 
     def at(self, vehicle: VehicleState, now_s: float) -> dict[str, Any]:
         """As of now, over the last seconds."""

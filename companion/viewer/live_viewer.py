@@ -58,6 +58,8 @@ class LiveViewer:
         None: nobody knows, as on a real rover.
         """
         try:
+            if self._requests is not None:
+                self._requests.note(status.time_s)
             self._pass_on()
         except Exception as error:  # nor is what somebody asks for
             self._requests = None

@@ -17,7 +17,8 @@ from companion.vehicle.events import RequestAnswer, RequestForm, RoverMode
 
 NO_ANSWER_S, CONFIRMED_S = 4.0, 3.0
 OLD_S = 3.0
-"""What is asked for by somebody who looks at an older moment is not done, except to stop."""
+"""What is asked for by somebody who looks at an older moment is not done, except to stop. Seconds of the person's own
+time: a simulated run may go faster."""
 FORMS = {
     "pause": RequestForm.PAUSE,
     "resume": RequestForm.CONTINUE,
@@ -54,6 +55,21 @@ class PageRequests:
         self._unconfirmed: deque[_Asked] = deque()
         """Accepted changes of the mode that no heartbeat has shown yet."""
         self._done: list[Json] = []
+        self._moments: deque[tuple[float, float]] = deque()
+        """The last ticks: a stopwatch, and the companion's clock."""
+
+    def note(self, time_s: float) -> None:
+        """Once a tick, before requests are taken. ``time_s``: the companion's clock."""
+        now_s = stopwatch_s()
+        self._moments.append((now_s, time_s))
+        while now_s - self._moments[0][0] > OLD_S:
+            self._moments.popleft()
+
+    def _is_late(self, shown_s: float | None) -> bool:
+        """Whether the page shows another moment than one of the last seconds."""
+        if shown_s is None or not self._moments:
+            return True
+        return not self._moments[0][1] <= shown_s <= self._moments[-1][1] + OLD_S
 
     def take(self, asked: Json, companion: Companion) -> None:
         """A request as the web process passes it on.
@@ -61,8 +77,7 @@ class PageRequests:
         ``number``, ``action``, ``place`` (north and east), and what the page showed then: ``goal`` and the time ``t``.
         """
         number, action, shown_s = int(asked["number"]), str(asked["action"]), asked.get("t")
-        late = shown_s is None or not abs(companion.status().time_s - shown_s) <= OLD_S
-        fault = TOO_OLD if late and action != "pause" else self._ask(action, asked, companion)
+        fault = TOO_OLD if self._is_late(shown_s) and action != "pause" else self._ask(action, asked, companion)
         if fault:
             self._answer(number, action, fault, ok=fault == NOT_PAUSED)
         else:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -47,10 +47,10 @@ def report_data(record: Record, others: list[Record]) -> Json:
     return joined(record, watched, first, more)
 
 
-def counted(record: Record) -> Run:
-    """A run, made again only to count. Raises RecordError."""
+def counted(record: Record, run_again: Callable[[Record, ReplayObserver], ReplayResult] = replay) -> Run:
+    """A run, made again with ``run_again`` only to count. Raises RecordError."""
     tally = RunTally()
-    return run_of(record, tally, replay(record, tally))
+    return run_of(record, tally, run_again(record, tally))
 
 
 def run_of(record: Record, tally: RunTally, result: ReplayResult) -> Run:
@@ -175,13 +175,17 @@ class ReportWatch(ReplayObserver):
         executor, pose = companion.executor, companion.status().pose
         if executor is None or pose is None:
             return
+        whole = companion.done
         if executor.evidence is not self._evidence:
-            self._evidence, self._watch = executor.evidence, TileWatch(executor.evidence)
+            self._evidence, self._watch, whole = executor.evidence, TileWatch(executor.evidence), True
             self.scene = scene_of(self._mission, companion.mission_run, 1)
-        if self._watch is None or (time_s - self._tiles_s < TILES_S - 1e-6 and not companion.done):
+        if self._watch is None or (time_s - self._tiles_s < TILES_S - 1e-6 and not whole):
             return
         self._tiles_s, seen = time_s, companion.vehicle.scan
-        news = self._watch.changed(executor.evidence, pose.point, 0.0 if seen is None else seen.scan.max_range_m)
+        reach_m = 0.0 if seen is None else seen.scan.max_range_m
+        news = self._watch.changed(executor.evidence, pose.point, reach_m)
+        while whole and self._watch.is_behind:  # nobody waits for a report's ticks
+            news += self._watch.changed(executor.evidence, pose.point, 0.0)
         if news:
             self.tiles.append((round(time_s, 2), base64.b64encode(tile_message(news)).decode()))
 

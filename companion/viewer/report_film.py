@@ -5,7 +5,9 @@ Nouns: film.
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import shutil
 import subprocess
 from collections import deque
@@ -108,6 +110,9 @@ def _palette(picture: Image.Image) -> Image.Image:
     return palette
 
 
+FULL = os.strerror(errno.ENOSPC)
+
+
 def write_mp4(film: Film, file: Path) -> None:
     """H.264 in MP4, by ffmpeg. Raises FilmError if ffmpeg gives up, OSError if the file cannot be written."""
     width, height = film.size
@@ -130,7 +135,10 @@ def write_mp4(film: Film, file: Path) -> None:
         except BrokenPipeError:
             pass  # what ffmpeg says of it follows
         said = child.stderr.read().decode(errors="replace").strip()
-    if child.returncode != 0 or not file.exists():
+    if FULL in said:
+        raise OSError(errno.ENOSPC, FULL)
+    # It may say that a file could not be ended, and end well itself.
+    if child.returncode != 0 or said or not file.exists():
         reason = said.splitlines()[-1] if said else f"exit code {child.returncode}"
         raise FilmError(f"{file}: ffmpeg gave up: {reason}; use --gif")
 

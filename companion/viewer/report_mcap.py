@@ -24,10 +24,12 @@ from companion.viewer import foxglove
 from companion.viewer.foxglove_schemas import SCHEMAS
 from companion.viewer.frame import mode_name, news_of
 from companion.viewer.map_colours import CELL_COLOURS
-from companion.viewer.map_tiles import cell_classes
+from companion.viewer.map_tiles import FREE, SEEN_OBSTACLE, cell_classes
 
 MAP_S, PATH_S = 2.0, 0.5
 """So often each is written, if it has changed."""
+MAP_BYTES_A_SECOND = 1e6
+"""A large map is written less often, so that it takes no more than this on average."""
 OPAQUE = 255
 """Unknown ground, too: what shines through from behind has any colour, that of obstacles as well."""
 TOPICS = {
@@ -162,9 +164,9 @@ class McapReport(ReplayObserver):
         executor = companion.executor
         if executor is None:
             return
-        if time_s - self._map_s >= MAP_S - 1e-6 or companion.done:
-            self._map_s = time_s
-            self._put_map(executor.evidence, time_s, at_us)
+        if time_s >= self._map_s - 1e-6 or companion.done:
+            size = self._put_map(executor.evidence, time_s, at_us)
+            self._map_s = time_s + max(MAP_S, size / MAP_BYTES_A_SECOND)
         if time_s - self._path_s >= PATH_S - 1e-6 or companion.done:
             path = executor.driver.path
             places = np.empty((0, 2)) if path is None else path.points[path.progress :]
@@ -176,20 +178,22 @@ class McapReport(ReplayObserver):
             self._targets = targets
             self._put("/targets", time_s, foxglove.targets(at_us, targets))
 
-    def _put_map(self, evidence: EvidenceMap, time_s: float, at_us: int) -> None:
-        """What is known of the ground, cut to what is not unknown."""
+    def _put_map(self, evidence: EvidenceMap, time_s: float, at_us: int) -> int:
+        """What is known of the ground, cut to what was seen. Returns the bytes that it takes."""
         height, width = evidence.log_odds.shape
         cells = cell_classes(evidence, 0, 0, width, height)
-        if self._map == cells.tobytes() or not cells.any():
-            return
+        known = (cells == FREE) | (cells == SEEN_OBSTACLE)
+        if self._map == cells.tobytes() or not known.any():
+            return 0
         self._map = cells.tobytes()
-        rows, columns = (np.flatnonzero(cells.any(axis=axis)) for axis in (1, 0))
+        rows, columns = (np.flatnonzero(known.any(axis=axis)) for axis in (1, 0))
         kept = cells[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         opacity = np.full(kept.shape, OPAQUE, np.uint8)
         colours = np.dstack((CELL_COLOURS[kept], opacity))
         corner, cell_m = evidence.base.south_west, evidence.evidence_m
         south_west = NedPoint(corner.north_m + rows[0] * cell_m, corner.east_m + columns[0] * cell_m)
         self._put("/map", time_s, foxglove.grid(at_us, south_west, cell_m, colours))
+        return colours.nbytes
 
     def _at_us(self, time_s: float) -> int:
         """Microseconds since 1970; the format has no time before that."""

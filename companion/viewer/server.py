@@ -46,6 +46,10 @@ MOST_NAME = 200
 HELLO_S, SEND_S = 10.0, 20.0
 ACTIONS_A_SECOND = 5
 WRONG_TOKEN_S = 0.5
+MOST_UNSENT, LOOK_S = 16_000_000, 0.2
+"""Bytes that browsers have not taken yet, of all together; they are looked at so often."""
+SILENT_S = 5.0
+"""After so long a connection without a request is ended: nobody may take all of them."""
 LAST_S = 0.4
 """So long browsers have to be told the last moment."""
 LONGEST_S = 1e9
@@ -106,8 +110,12 @@ class WebApp:
             return
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError):
             may_act = await self._greeted(socket)
-            if may_act is not None:
-                await self._serve(socket, may_act)
+            if may_act is None:
+                return
+            if len(self.board) >= MOST_SPECTATORS:  # others may have been greeted at the same time
+                await socket.close(TOO_MANY)
+                return
+            await self._serve(socket, may_act)
 
     async def _greeted(self, socket: WebSocket) -> bool | None:
         """Whether this one may act; None if it may not even look on."""
@@ -256,6 +264,36 @@ def _message(text: str) -> dict[str, Any]:
     return message if isinstance(message, dict) else {}
 
 
+async def _watch(server: uvicorn.Server) -> None:
+    """End connections that fill the memory, the fullest first, and those that ask for nothing.
+
+    The library answers each ping at once, however much the other end has not taken; and it waits for ever for a first
+    request.
+    """
+    since_s: dict[Any, float] = {}
+    while True:
+        await asyncio.sleep(LOOK_S)
+        now_s, open_ones = asyncio.get_running_loop().time(), list(server.server_state.connections)
+        since_s = {one: since_s.get(one, now_s) for one in open_ones}
+        for transport in fullest([one.transport for one in open_ones], MOST_UNSENT):
+            transport.abort()
+        for one, first_s in since_s.items():
+            if getattr(one, "cycle", True) is None and now_s - first_s > SILENT_S:
+                one.transport.abort()
+
+
+def fullest(transports: list[Any], most: int) -> list[Any]:
+    """Those with the most unsent bytes, so many that the others together have no more than ``most``."""
+    ordered = sorted(transports, key=lambda one: one.get_write_buffer_size(), reverse=True)
+    unsent, ended = sum(one.get_write_buffer_size() for one in ordered), []
+    for one in ordered:
+        if unsent <= most:
+            break
+        unsent -= one.get_write_buffer_size()
+        ended.append(one)
+    return ended
+
+
 def _listen(app: WebApp, server: uvicorn.Server, loop: asyncio.AbstractEventLoop) -> None:
     """In a thread: what the run says, to the end."""
 
@@ -297,7 +335,9 @@ async def _run(descriptor: int) -> None:
     )
     server = uvicorn.Server(config)
     threading.Thread(target=_listen, args=(app, server, asyncio.get_running_loop()), daemon=True).start()
+    watch = asyncio.create_task(_watch(server))
     await server.serve(sockets=[socket.socket(fileno=descriptor)])
+    watch.cancel()
 
 
 if __name__ == "__main__":

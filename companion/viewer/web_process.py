@@ -89,6 +89,8 @@ def _token(file: Path) -> str:
     """The token in a file that only its owner may read. Raises WebError."""
     if file.is_dir():
         raise WebError(f"--web-token {file}: is a folder; name a file in it")
+    if file.exists() and not file.is_file():
+        raise WebError(f"--web-token {file}: is no ordinary file; name one, or one that does not exist yet")
     if not file.parent.is_dir():
         raise WebError(f"--web-token {file}: there is no folder {file.parent}; make it, or name another one")
     try:

@@ -22,9 +22,12 @@ from typer.testing import CliRunner
 from companion.cli.commands import app
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
+from companion.replay.replay import replay
+from companion.viewer import map_tiles
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
-from companion.viewer.report_data import counted
+from companion.viewer.report_data import ReportWatch, counted
 from companion.viewer.report_tables import tables_of
+from companion.viewer.wire import tiles_in
 from tests.support.records import START_US, recorded, write_record
 from tests.support.reports import report_data_in
 from tests.support.rig import yard
@@ -198,6 +201,21 @@ def near(found: Counter[tuple[int, ...]], colour: tuple[int, int, int]) -> int:
     return sum(count for one, count in found.items() if all(abs(a - b) < 12 for a, b in zip(one, colour, strict=True)))
 
 
+def test_a_map_that_is_larger_than_a_look_is_whole_in_the_first_moment_and_in_the_last(
+    record: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def tiles() -> tuple[dict[Any, bytes], dict[Any, bytes]]:
+        watch = ReportWatch(load_record(record))
+        replay(load_record(record), watch)
+        told = [dict(tiles_in(base64.b64decode(message))) for _, message in watch.tiles]
+        return told[0], {place: cells for message in told for place, cells in message.items()}
+
+    first, last = tiles()
+    monkeypatch.setattr(map_tiles, "AT_ONCE", 1)
+    monkeypatch.setattr(map_tiles, "MOST_NEAR", 2)
+    assert tiles() == (first, last) and len(last) >= len(first) > 3
+
+
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
 def test_the_film_is_made_by_ffmpeg_too(record: Path, tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["report", str(record), "--mp4", str(tmp_path / "r.mp4")])
@@ -212,6 +230,10 @@ def test_the_film_is_made_by_ffmpeg_too(record: Path, tmp_path: Path) -> None:
     [
         (None, "--mp4: ffmpeg is not installed; install it (apt-get install ffmpeg), or use --gif"),
         ("#!/bin/sh\necho Unknown encoder libx264 >&2\nexit 8\n", "ffmpeg gave up: Unknown encoder libx264; use --gif"),
+        (
+            "#!/bin/sh\n: > ${0%ffmpeg}r.mp4\necho Unable to re-open the file: No space left on device >&2\n",
+            "r.mp4: cannot be written: No space left on device",
+        ),
     ],
 )
 def test_an_ffmpeg_that_is_missing_or_gives_up_is_one_line(
@@ -222,7 +244,17 @@ def test_an_ffmpeg_that_is_missing_or_gives_up_is_one_line(
         (tmp_path / "ffmpeg").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     result = CliRunner().invoke(app, ["report", str(record), "--mp4", str(tmp_path / "r.mp4")])
-    assert result.exit_code == 2 and result.output.endswith(f"{says}\n") and result.output.count("\n") == 1
+    assert result.exit_code == 2 and f"{says}" in result.output and result.output.count("\n") == 1
+
+
+def test_where_there_is_no_browser_open_says_what_to_open(
+    record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("webbrowser.open", lambda address: False)
+    file = tmp_path / "r.html"
+    result = CliRunner().invoke(app, ["report", str(record), "--out", str(file), "--open"])
+    assert result.exit_code == 0
+    assert result.stderr == f"no browser was found on this computer; open {file.resolve().as_uri()}\n"
 
 
 def test_there_is_no_film_of_a_mission_that_had_not_begun(tmp_path: Path) -> None:

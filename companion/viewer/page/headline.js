@@ -3,7 +3,7 @@
 import { make, setAttribute, setText } from "viewer/dom.js";
 import { setIcon } from "viewer/icons.js";
 import { distance, wayLeft } from "viewer/geometry.js";
-import { clock, metres, number, sentence } from "viewer/words.js";
+import { metres, namedClock, number, sentence } from "viewer/words.js";
 
 /** A line of more letters than this is written smaller. */
 const LONG = 40;
@@ -42,9 +42,9 @@ export class Headline {
     setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
     setText(this.mission, scene?.mission ?? "");
     setText(this.badge, scene ? badge(scene, state === "ended") : "");
-    setText(this.clock, frame ? clock(frame.t, scene) : "");
+    setText(this.clock, frame ? namedClock(frame.t, scene) : "");
     // A report keeps the title of its file.
-    if (scene?.live !== false)
+    if (scene && scene.live !== false)
       document.title = `${trouble || frame?.line || "connecting"} · ${scene?.mission ?? "rover"}`;
   }
 }

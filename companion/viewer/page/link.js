@@ -3,9 +3,10 @@
 const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 5000;
 const DENIED = 4401;
+const TOO_MANY = 1013;
 
 export class Link {
-  /** `on` holds the functions opened(), message(object), tiles(buffer), closed() and denied(text). */
+  /** `on` holds the functions opened(), message(object), tiles(buffer), closed(why) and denied(text). */
   constructor(address, on) {
     Object.assign(this, { address, on, token: null, wait: FIRST_WAIT_MS, socket: null, timer: 0 });
     // A phone that wakes up has lost its sockets and must not wait.
@@ -46,7 +47,7 @@ export class Link {
   end(socket, code) {
     if (socket !== this.socket) return;
     this.socket = null;
-    this.on.closed();
+    this.on.closed(code === TOO_MANY ? "Too many browsers look on" : "");
     if (code === DENIED || this.refused) {
       this.on.denied(this.refused || "A token is needed.");
       return;

@@ -57,7 +57,7 @@ class LivePage {
       opened: () => this.model.connected(),
       message: (message) => this.take(message),
       tiles: (buffer) => this.model.takeTiles(buffer),
-      closed: () => this.refresh(),
+      closed: (why) => this.leave(why),
       denied: (text) => this.deny(text),
     });
     this.link.token = findToken();
@@ -72,6 +72,11 @@ class LivePage {
     forgetToken();
     // Who gave a wrong one may still be allowed to look on without any.
     this.askToken(text, this.link.token ? () => this.enter(null) : null);
+  }
+
+  leave(why) {
+    this.why = why;
+    this.refresh();
   }
 
   askToken(text, cancelled) {
@@ -132,7 +137,7 @@ class LivePage {
     if (silent < STALE_MS) return "";
     const since = lasting(silent / 1000);
     if (this.link?.open) return this.model.frame ? `No data since ${since}` : "";
-    return `No connection since ${since}`;
+    return `${this.why || "No connection"} since ${since}`;
   }
 }
 

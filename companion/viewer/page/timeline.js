@@ -4,7 +4,7 @@ import { stateColour, theme } from "viewer/colours.js";
 import { make, setAttribute, setText } from "viewer/dom.js";
 import { icon, setIcon } from "viewer/icons.js";
 import { SPEEDS } from "viewer/playback.js";
-import { clock, elapsed } from "viewer/words.js";
+import { clock, elapsed, namedClock } from "viewer/words.js";
 
 const LANE = 26;
 const BAND = 10;
@@ -76,7 +76,7 @@ export class Timeline {
     if (document.activeElement !== this.slider || Number(this.slider.value) !== playback.t)
       this.slider.value = playback.t;
     setAttribute(this.slider, "aria-valuetext", elapsed(playback.t - playback.begin));
-    const day = Number.isFinite(record.scene.began_unix_s) ? clock(playback.t, record.scene) : elapsed(playback.t);
+    const day = Number.isFinite(record.scene.began_unix_s) ? namedClock(playback.t, record.scene) : elapsed(playback.t);
     setText(this.time, `${elapsed(playback.t - playback.begin)} of ${elapsed(playback.end - playback.begin)}`);
     setAttribute(this.time, "title", day);
     setIcon(this.play, playback.playing ? "pause" : "play");

@@ -16,14 +16,19 @@ export function metres(value) {
   return value < 99.95 ? `${value.toFixed(1)} m` : `${value.toFixed(0)} m`;
 }
 
-/** The time of day at `t` where the source knows it, otherwise the time since its clock began. */
+/** The time of day at `t` in UTC, as records and replays count, where it is known; else the time since the beginning. */
 export function clock(t, scene) {
   if (!Number.isFinite(t)) return UNKNOWN;
   if (Number.isFinite(scene?.began_unix_s)) {
     const date = new Date((scene.began_unix_s + t) * 1000);
-    return [date.getHours(), date.getMinutes(), date.getSeconds()].map(two).join(":");
+    return [date.getUTCHours(), date.getUTCMinutes(), date.getUTCSeconds()].map(two).join(":");
   }
   return elapsed(t);
+}
+
+/** As `clock`, and what clock it is. */
+export function namedClock(t, scene) {
+  return Number.isFinite(t) && Number.isFinite(scene?.began_unix_s) ? `${clock(t, scene)} UTC` : clock(t, scene);
 }
 
 /** A time since the beginning: 1:05 or 1:02:05. */

@@ -105,7 +105,7 @@ class RunView:
             percent = "" if vehicle.battery.percent is None else f", {vehicle.battery.percent} %"
             facts.append(Fact("battery", f"{vehicle.battery.volts:.1f} V{percent}"))
         if vehicle.gps is not None:
-            facts.append(Fact("GPS", f"{vehicle.gps.fix}, {vehicle.gps.satellites} satellites", minor=True))
+            facts.append(Fact("GPS", f"{vehicle.gps.fix.text}, {vehicle.gps.satellites} satellites", minor=True))
         return Section("Rover", tuple(facts))
 
     def _link_section(self, status: Status) -> Section:

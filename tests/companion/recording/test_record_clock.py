@@ -36,7 +36,16 @@ def test_times_are_shown_as_they_can_be_typed() -> None:
 
 @pytest.mark.parametrize(
     ("text", "since_s"),
-    [("0s", 0.0), ("83.5s", 83.5), ("83.5 s", 83.5), ("23:41", 59.75), ("00:00:00", 1199.75), ("9:40:00.25", 36_000.0)],
+    [
+        ("0s", 0.0),
+        ("83.5s", 83.5),
+        ("83.5 s", 83.5),
+        ("83.5", 83.5),
+        ("23:41", 59.75),
+        ("23:41:3", 62.75),
+        ("00:00:00", 1199.75),
+        ("9:40:00.25", 36_000.0),
+    ],
 )
 def test_a_moment_is_seconds_or_a_time_of_day(text: str, since_s: float) -> None:
     assert EVENING.moment_s(text) == pytest.approx(since_s)
@@ -48,7 +57,7 @@ def test_a_time_of_day_that_never_came_is_not_in_the_record() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "s", "66", "-1s", "1e3s", "nans", "24:00:00", "12:60", "12:00:60", "12", "٣s", "1:2:3"]
+    "text", ["", "s", "66", "-1s", "1e3s", "nans", "24:00:00", "12:60", "12:00:60", "12", ".5", "5.", "٣s", "1:2:3"]
 )
 def test_anything_else_is_no_moment(text: str) -> None:
     assert EVENING.moment_s(text) is None

@@ -20,7 +20,9 @@ from tests.companion.viewer.test_feed import MISSION
 
 
 class Page:
-    """Somebody at the page of a drive."""
+    """Somebody at the page of a drive that goes ``speedup`` times as fast as real time."""
+
+    speedup = 1.0
 
     def __init__(self, folder: Path) -> None:
         mission, settings = load_mission(MISSION), parse_settings({}, "test")
@@ -30,11 +32,18 @@ class Page:
         scenario = scenario_from_mission(mission)
         self.run = Drive(mission, scenario, settings, 3, self.recorder, 300.0, station=station)
         self.number = 0
+        self.real_s = 0.0
+        """The stopwatch of whoever looks on."""
+
+    def stopwatch_s(self) -> float:
+        return self.real_s
 
     def ticks(self, seconds: float) -> None:
         end_s = self.run.simulator.time_s + seconds
         while self.run.simulator.time_s < end_s and not self.run.companion.done:
             self.run.companion.tick()
+            self.real_s += 0.05 / self.speedup
+            self.requests.note(self.run.companion.status().time_s)
 
     def drives(self) -> None:
         while self.run.companion.vehicle.speed_m_s < 0.5:
@@ -55,8 +64,15 @@ class Page:
         return str(answer["text"])
 
 
-def test_pause_go_on_send_and_skip_and_the_record_is_replayed(tmp_path: Path) -> None:
+@pytest.fixture
+def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Page:
     page = Page(tmp_path / "record")
+    monkeypatch.setattr(page_requests, "stopwatch_s", page.stopwatch_s)
+    return page
+
+
+def test_pause_go_on_send_and_skip_and_the_record_is_replayed(page: Page) -> None:
+    page.ticks(0.1)
     assert page.ask("skip", goal="far end") == page.ask("goto", place=[1.0, 1.0]) == NOT_DRIVING
     page.drives()
     companion = page.run.companion
@@ -66,7 +82,9 @@ def test_pause_go_on_send_and_skip_and_the_record_is_replayed(tmp_path: Path) ->
     heartbeat = companion.vehicle.heartbeat
     assert heartbeat is not None and heartbeat.mode == 4 and companion.vehicle.speed_m_s < 0.1
     assert page.ask("goto", place=[5.0, 1.0]).startswith("not driving")
-    assert page.ask("resume", t=companion.status().time_s - 5.0) == page.ask("resume", t=None) == TOO_OLD
+    now_s = companion.status().time_s
+    assert page.ask("resume", t=now_s - 5.0) == page.ask("resume", t=now_s + 60.0) == TOO_OLD
+    assert page.ask("resume", t=None) == TOO_OLD
     assert page.ask("resume") == ""
     page.drives()
     assert page.ask("goto", place=[9000.0, 0.0]).endswith("farther than 300 m")
@@ -81,6 +99,15 @@ def test_pause_go_on_send_and_skip_and_the_record_is_replayed(tmp_path: Path) ->
     page.recorder.close()
     result = replay(load_record(page.recorder.directory))
     assert not result.differences and result.ticks > 100
+
+
+def test_in_a_drive_that_goes_faster_the_same_delay_is_no_fault(page: Page) -> None:
+    page.speedup = 20.0
+    page.drives()
+    assert page.ask("goto", place=[3.0, 3.0], t=page.run.companion.status().time_s - 0.3 * page.speedup) == ""
+    page.ticks(3.0 * page.speedup)
+    assert page.ask("skip", goal="any", t=page.run.companion.status().time_s - 3.5 * page.speedup) == TOO_OLD
+    page.recorder.close()
 
 
 def test_what_nobody_answers_is_told_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

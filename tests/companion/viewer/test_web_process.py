@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -14,12 +15,14 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from companion.viewer import wire
 from companion.viewer.map_tiles import run_lengths
+from companion.viewer.server import MOST_SPECTATORS, fullest
 from companion.viewer.web_process import WebError, WebPlace, WebProcess, web_place
 from tests.companion.viewer.test_live_board import SCENE, frame
 
@@ -196,8 +199,10 @@ def test_a_process_that_stalls_costs_moments_and_no_time(web: WebProcess) -> Non
     assert time.monotonic() - began_s < 5.0
 
 
-def test_a_browser_that_never_reads_holds_up_nobody(web: WebProcess) -> None:
-    deaf = socket.create_connection(("127.0.0.1", web.place.port))
+@contextmanager
+def unread(port: int) -> Iterator[socket.socket]:
+    """A browser that has said hello and reads nothing any more."""
+    deaf = socket.create_connection(("127.0.0.1", port))
     deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     upgrade = (
         "Connection: Upgrade",
@@ -205,17 +210,22 @@ def test_a_browser_that_never_reads_holds_up_nobody(web: WebProcess) -> None:
         "Sec-WebSocket-Version: 13",
         f"Sec-WebSocket-Key: {'A' * 22}==",
     )
-    head = ("GET /ws HTTP/1.1", f"Host: 127.0.0.1:{web.place.port}", *upgrade, "", "")
+    head = ("GET /ws HTTP/1.1", f"Host: 127.0.0.1:{port}", *upgrade, "", "")
     deaf.sendall("\r\n".join(head).encode())
+    assert deaf.recv(2000).startswith(b"HTTP/1.1 101")
     hello = b'{"kind":"hello"}'
     deaf.sendall(bytes([0x81, 0x80 | len(hello)]) + bytes(4) + hello)
-    with looking(web) as client:
+    with deaf:
+        yield deaf
+
+
+def test_a_browser_that_never_reads_holds_up_nobody(web: WebProcess) -> None:
+    with unread(web.place.port), looking(web) as client:
         next_of(client, "scene")
         for step in range(40):
             message = json.dumps({**frame(0.2 * step), "path": [[0.0, 0.0]] * 5000}).encode()
             wait_until(lambda told=message: web.put(wire.JSON, told))
         assert newest(client, 0.2 * 39) == pytest.approx(0.2 * 39)
-    deaf.close()
 
 
 def test_fifty_browsers_all_see_the_newest_moment(web: WebProcess) -> None:
@@ -241,6 +251,7 @@ def test_places_and_tokens(tmp_path: Path) -> None:
         ("http://localhost", None, "not a place"),
         ("70000", None, "not a place"),
         ("8000", tmp_path, "is a folder; name a file"),
+        ("8000", Path("/dev/null"), "is no ordinary file"),
         ("8000", tmp_path / "none" / "token", "there is no folder"),
     ):
         with pytest.raises(WebError, match=says):
@@ -255,3 +266,60 @@ def test_a_port_that_is_taken_is_told_at_once() -> None:
         port = taken.getsockname()[1]
         with pytest.raises(WebError, match=rf"^--web 127.0.0.1:{port}: Address already in use; choose another one$"):
             WebProcess(WebPlace("127.0.0.1", port))
+
+
+def memory_mb(process: WebProcess) -> float:
+    assert process.process_id is not None
+    return psutil.Process(process.process_id).memory_info().rss / 1e6
+
+
+def test_a_flood_of_pings_from_one_who_never_reads_does_not_fill_the_memory(web: WebProcess) -> None:
+    before_mb = memory_mb(web)
+    ping = bytes([0x89, 0x80 | 125]) + bytes(4) + bytes(125)
+    sent, most_mb, started = 0, 0.0, web.started
+    with unread(web.place.port) as deaf, contextlib.suppress(OSError):
+        while sent < 120_000_000:
+            sent += deaf.send(ping * 2000)
+            most_mb = max(most_mb, memory_mb(web))
+    assert sent > 15_000_000, "it was let flood for a while, and then cut off"
+    assert sent < 120_000_000 and most_mb < before_mb + 45.0
+    with looking(web) as client:
+        assert next_of(client, "scene")["mission"] == "yard"
+    assert web.started == started
+
+
+def test_the_fullest_are_ended_and_no_more_than_needed() -> None:
+    class Sink:
+        def __init__(self, unsent: int) -> None:
+            self.get_write_buffer_size = lambda: unsent
+
+    sinks = [Sink(size) for size in (3, 9, 0, 5)]
+    assert fullest(sinks, 17) == [] and fullest(sinks, 8) == [sinks[1]]
+    assert fullest(sinks, 0) == [sinks[1], sinks[3], sinks[0]]
+
+
+def test_connections_that_ask_for_nothing_are_ended_and_lock_nobody_out(web: WebProcess) -> None:
+    with ExitStack() as stack:
+        address = ("127.0.0.1", web.place.port)
+        silent = [stack.enter_context(socket.create_connection(address)) for _ in range(300)]
+        silent[0].sendall(b"GET / HTTP/1.1\r\nHost:")
+        wait_until(lambda: got(web, "/")[0] == 200)
+        for one in (silent[0], silent[-1]):
+            one.settimeout(WAIT_S)
+            with contextlib.suppress(ConnectionResetError):
+                assert one.recv(10) == b""
+
+
+def test_more_than_may_look_on_at_once_are_told_so(web: WebProcess) -> None:
+    address = f"ws://127.0.0.1:{web.place.port}/ws"
+    with ExitStack() as stack:
+        clients = [stack.enter_context(connect(address, open_timeout=WAIT_S)) for _ in range(MOST_SPECTATORS + 6)]
+        for client in clients:
+            client.send(json.dumps({"kind": "hello", "token": None}))
+        turned_away = 0
+        for client in clients:
+            try:
+                next_of(client, "scene")
+            except ConnectionClosed as closed:
+                turned_away += closed.rcvd is not None and closed.rcvd.code == 1013
+        assert turned_away == 6
