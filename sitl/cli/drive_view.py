@@ -59,14 +59,15 @@ class DriveView:
         for collision in collisions[self._collisions :]:
             self._watching.tell(f"{collision.time_s:.0f} s: {collision.told(self._run.scenario.start)}")
         self._collisions = len(collisions)
+        time_s = self._run.simulator.time_s  # the clock of all lines: the companion's is a tick behind
         for news in status.news:
-            self._watching.tell(f"{status.time_s:.0f} s: {news.text}")
+            self._watching.tell(f"{time_s:.0f} s: {news.text}")
         decision = status.decision
         if decision is None or (status.steps, decision.reason) == self._told_of:
             return
         self._told_of = (status.steps, decision.reason)
         if decision.part is not Part.EXPLORE:  # following the path is not an event: the panel always shows it
-            self._tell_decision(status.time_s, decision.reason)
+            self._tell_decision(time_s, decision.reason)
 
     def _tell_decision(self, time_s: float, reason: str) -> None:
         """One line for the same decision several times in a row."""
