@@ -5,10 +5,12 @@ Nouns: heat map.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -20,10 +22,12 @@ from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.summary import Runs, labels, varied
 from sitl.campaign.worded import GroundSpec
 from sitl.experiments import drawing
-from sitl.scenario import scenario_from_mission
+from sitl.scenario import Scenario, scenario_from_mission
 
 COLOURS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.RED, drawing.GREY, "#7b5ea7", "#56b4e9", "#444444")
 STROKES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
+MOST_PANELS = 9
+"""Of a heat map: more combinations are not drawn."""
 
 
 def times(campaign: CampaignTable, runs: Runs) -> Figure:
@@ -77,43 +81,69 @@ def _named(axis: str, value: object, words: dict[object, str]) -> str:
     return f"{axis} {words[value]}" if isinstance(value, bool | float) else words[value]
 
 
-def heat_maps(runs: Runs, folder: Path) -> list[tuple[str, Figure]]:
-    """Of each world that is the same for every seed: the mission's name and its picture."""
-    results: dict[str, list[RunResult]] = {}
-    for spec, result in runs:
-        if GroundSpec.of(spec.world) is None and result.outcome != ERROR:
-            results.setdefault(spec.world, []).append(result)
-    return [(world, _heat_map(folder / world, own)) for world, own in results.items()]
+def heat_maps(campaign: CampaignTable, runs: Runs, folder: Path) -> list[tuple[str, Figure]]:
+    """Of each world that is the same for every seed: the mission's name and its picture, a panel a combination."""
+    names, maps = _combinations(campaign, runs), []
+    for world in campaign.worlds:
+        own: dict[str, list[RunResult]] = {}
+        for spec, result in runs:
+            if spec.world == world and GroundSpec.of(world) is None and result.outcome != ERROR:
+                own.setdefault(names[_key(campaign, spec)], []).append(result)
+        if own:
+            maps.append((world, _heat_map(folder / world, own)))
+    return maps
 
 
-def _heat_map(mission_file: Path, results: list[RunResult]) -> Figure:
+def _heat_map(mission_file: Path, results: dict[str, list[RunResult]]) -> Figure:
+    """``results``: by the name of the combination. All panels have the same colours for the same time."""
+    spent = {name: _mean_s(own) for name, own in list(results.items())[:MOST_PANELS]}
+    scenario = scenario_from_mission(load_mission(mission_file))
+    places = [place for one in spent.values() for place in one]
+    north_m, east_m = _extent(places, scenario.start.north_m, scenario.start.east_m)
+    longest_s = max((seconds for one in spent.values() for seconds in one.values()), default=1.0)
+    columns = math.ceil(math.sqrt(len(spent)))
+    lines, width = -(-len(spent) // columns), 8.0 if len(spent) == 1 else 4.2
+    tall = width * 0.9 * min(1.2, (north_m[1] - north_m[0]) / (east_m[1] - east_m[0])) + 0.9
+    figure = Figure(figsize=(width * columns + 0.8, tall * lines + 0.3), layout="constrained")
+    panels = figure.subplots(lines, columns, squeeze=False).ravel()
+    for panel, (name, squares) in zip(panels, spent.items(), strict=False):
+        shares = np.full((north_m[1] - north_m[0], east_m[1] - east_m[0]), np.nan)
+        for (north, east), mean_s in squares.items():
+            shares[north - north_m[0], east - east_m[0]] = mean_s
+        _draw_walls(panel, scenario)
+        shown_at = (east_m[0], east_m[1], north_m[0], north_m[1])
+        image = panel.imshow(
+            shares, origin="lower", extent=shown_at, cmap="YlOrRd", vmin=0.0, vmax=longest_s, interpolation="nearest"
+        )
+        panel.set_xlim(east_m[0], east_m[1])
+        panel.set_ylim(north_m[0], north_m[1])
+        panel.plot(scenario.start.east_m, scenario.start.north_m, "^", color=drawing.BLUE, markersize=8)
+        panel.set_xlabel("metres east", fontsize=8)
+        panel.set_ylabel("metres north", fontsize=8)
+        panel.tick_params(labelsize=8)
+        drawing.title(panel, f"{mission_file.stem}, {name}: {len(results[name])} runs")
+    for panel in panels[len(spent) :]:
+        panel.set_visible(False)
+    figure.colorbar(image, ax=panels.tolist(), label="seconds in a square metre", shrink=0.8)
+    return figure
+
+
+def _mean_s(results: list[RunResult]) -> dict[tuple[int, int], float]:
+    """Seconds in each square, the mean of the runs."""
     spent: dict[tuple[int, int], float] = {}
     for result in results:
         for north, east, seconds in result.dwelt:
             spent[north, east] = spent.get((north, east), 0.0) + seconds / len(results)
-    scenario = scenario_from_mission(load_mission(mission_file))
-    north_m, east_m = _extent(list(spent), scenario.start.north_m, scenario.start.east_m)
-    shares = np.full((north_m[1] - north_m[0], east_m[1] - east_m[0]), np.nan)
-    for (north, east), mean_s in spent.items():
-        shares[north - north_m[0], east - east_m[0]] = mean_s
-    figure = Figure(figsize=(8.0, 1.2 + 7.0 * min(1.2, shares.shape[0] / shares.shape[1])), layout="constrained")
-    panel = figure.subplots()
+    return spent
+
+
+def _draw_walls(panel: Axes, scenario: Scenario) -> None:
     solid: NDArray[np.bool_] = scenario.world.obstacles
-    side_m = scenario.world.resolution_m
     if solid.size > 1:
-        walls = np.where(solid, 1.0, np.nan)
+        side_m = scenario.world.resolution_m
         edges = (0.0, solid.shape[1] * side_m, 0.0, solid.shape[0] * side_m)
+        walls = np.where(solid, 1.0, np.nan)
         panel.imshow(walls, origin="lower", extent=edges, cmap="gray", vmin=0.0, vmax=4.0, interpolation="nearest")
-    shown_at = (east_m[0], east_m[1], north_m[0], north_m[1])
-    image = panel.imshow(shares, origin="lower", extent=shown_at, cmap="YlOrRd", vmin=0.0, interpolation="nearest")
-    panel.set_xlim(east_m[0], east_m[1])
-    panel.set_ylim(north_m[0], north_m[1])
-    panel.plot(scenario.start.east_m, scenario.start.north_m, "^", color=drawing.BLUE, markersize=8)
-    panel.set_xlabel("metres east", fontsize=8)
-    panel.set_ylabel("metres north", fontsize=8)
-    drawing.title(panel, f"{mission_file.stem}: {len(results)} runs")
-    figure.colorbar(image, ax=panel, label="seconds in a square metre", shrink=0.8)
-    return figure
 
 
 def _extent(places: list[tuple[int, int]], north_m: float, east_m: float) -> tuple[tuple[int, int], tuple[int, int]]:

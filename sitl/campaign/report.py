@@ -65,11 +65,11 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
         ]
     if any(result.complete for _, result in runs):
         parts += ["<h2>Driving times</h2>", _figure(times(campaign, runs), "driving times of complete runs")]
-    maps = heat_maps(runs, source.resolve().parent)
+    maps = heat_maps(campaign, runs, source.resolve().parent)
     if maps:
         parts.append(
             "<h2>Where the time goes</h2><p>Seconds in each square of one metre where a run stayed "
-            "for a second or more: mean over the runs of all combinations.</p>"
+            "for a second or more: mean over the runs of each combination, in the same colours.</p>"
         )
         parts += [_figure(figure, f"where the time goes: {world}") for world, figure in maps]
     parts += _lists(campaign, runs, source)
