@@ -23,7 +23,8 @@ from companion.viewer.web_process import WebPlace, WebProcess
 class LiveViewer:
     """``web`` is there before the companion, so that a place that cannot be served is told first.
 
-    Whatever goes wrong in it, the drive goes on: ``say`` is told once, and the page has no more news.
+    Whatever goes wrong in it, the drive goes on: ``say`` is told once, and the page has no more news. A process that
+    ends is begun anew, and ``say`` is told.
     """
 
     def __init__(self, place: WebPlace, say: Callable[[str], None], station: LocalStation | None = None) -> None:
@@ -34,6 +35,8 @@ class LiveViewer:
         self._say = say
         self._feed: ViewerFeed | None = None
         self._companion: Companion | None = None
+        self._told_of = self.web.started
+        """So many processes of the page are known of."""
 
     def follow(self, companion: Companion, settings: Settings, *, simulated: bool) -> None:
         """From now on this companion is shown."""
@@ -64,6 +67,9 @@ class LiveViewer:
         except Exception as error:  # nor is what somebody asks for
             self._requests = None
             self._say(f"nothing is heard from the page any more, the drive goes on: {type(error).__name__}: {error}")
+        if self.web.started > max(self._told_of, 1):
+            self._say("the page's process had ended; it was started again, and the drive went on")
+        self._told_of = self.web.started
         if self._feed is None:
             return
         try:

@@ -74,6 +74,7 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             os.kill(killed, signal.SIGKILL)
             desktop.until(lambda: web_process_of(program) not in (None, killed))
             desktop.until(lambda: "Driving to" in desktop.text)
+            program.says("the page's process had ended; it was started again, and the drive went on")
             before = clock_of(desktop)
             desktop.until(lambda: clock_of(desktop) != before and "Driving to" in desktop.text)
             assert f"Heading for {name}" in desktop.text and "No connection" not in desktop.text
