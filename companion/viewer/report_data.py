@@ -23,7 +23,7 @@ from companion.recording.contacts import Contact, contacts_of
 from companion.recording.reader import Record
 from companion.recording.record_clock import record_clock
 from companion.replay.explain import Candidate, DecisionExplainer, Explanation, explanation_lines
-from companion.replay.replay import Observers, ReplayObserver, ReplayResult, replay
+from companion.replay.replay import ReplayObserver, ReplayResult, replay
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of
 from companion.viewer.map_tiles import TileWatch
@@ -37,14 +37,6 @@ MOST_PLACES = 120
 """Of a candidate."""
 
 Json = dict[str, Any]
-
-
-def report_data(record: Record, others: list[Record]) -> Json:
-    """Everything that the page shows. ``others``: their tracks and figures. Raises RecordError if one is damaged."""
-    watched, tally = ReportWatch(record), RunTally()
-    result = replay(record, Observers((watched, tally)))
-    first, *more = named([run_of(record, tally, result), *(counted(one) for one in others)])
-    return joined(record, watched, first, more)
 
 
 def counted(record: Record, run_again: Callable[[Record, ReplayObserver], ReplayResult] = replay) -> Run:

@@ -105,14 +105,11 @@ class WebApp:
             await socket.close(DENIED)  # before it is accepted: the browser gets a 403
             return
         await socket.accept()
-        if len(self.board) >= MOST_SPECTATORS:
-            await socket.close(TOO_MANY)
-            return
         with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError):
             may_act = await self._greeted(socket)
             if may_act is None:
                 return
-            if len(self.board) >= MOST_SPECTATORS:  # others may have been greeted at the same time
+            if len(self.board) >= MOST_SPECTATORS:
                 await socket.close(TOO_MANY)
                 return
             await self._serve(socket, may_act)

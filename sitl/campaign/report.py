@@ -12,7 +12,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from sitl.campaign.campaign_file import CampaignTable, run_count
-from sitl.campaign.pictures import heat_maps, times
+from sitl.campaign.pictures import MOST_PANELS, heat_maps, times
 from sitl.campaign.policies import Policy, broken
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.summary import HEAD, PAIR_HEAD, Runs, broken_counts, differences, rows, shown, varied
@@ -69,7 +69,8 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
     if maps:
         parts.append(
             "<h2>Where the time goes</h2><p>Seconds in each square of one metre where a run stayed "
-            "for a second or more: mean over the runs of each combination, in the same colours.</p>"
+            "for a second or more: mean over the runs of each combination "
+            f"(the first {MOST_PANELS}), in the same colours.</p>"
         )
         parts += [_figure(figure, f"where the time goes: {world}") for world, figure in maps]
     parts += _lists(campaign, runs, source)

@@ -23,7 +23,7 @@ from companion.cli.commands import app
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
 from companion.replay.replay import replay
-from companion.viewer import map_tiles
+from companion.viewer import map_tiles, report_mcap
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
 from companion.viewer.report_data import ReportWatch, counted
 from companion.viewer.report_tables import tables_of
@@ -214,6 +214,19 @@ def test_a_map_that_is_larger_than_a_look_is_whole_in_the_first_moment_and_in_th
     monkeypatch.setattr(map_tiles, "AT_ONCE", 1)
     monkeypatch.setattr(map_tiles, "MOST_NEAR", 2)
     assert tiles() == (first, last) and len(last) >= len(first) > 3
+
+
+def test_a_map_that_is_large_is_written_for_other_programs_less_often(
+    record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def maps(file: Path) -> int:
+        assert CliRunner().invoke(app, ["report", str(record), "--mcap", str(file)]).exit_code == 0
+        with file.open("rb") as data:
+            return sum(1 for _ in make_reader(data).iter_messages(topics=["/map"]))
+
+    usual = maps(tmp_path / "usual.mcap")
+    monkeypatch.setattr(report_mcap, "MAP_BYTES_A_SECOND", 1.0)
+    assert 1 <= maps(tmp_path / "large.mcap") <= 2 < usual
 
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
