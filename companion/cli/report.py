@@ -19,7 +19,7 @@ from companion.mapping.map_files import MapError
 from companion.recording.reader import Record, files_of, load_record
 from companion.recording.record_clock import record_clock
 from companion.recording.record_format import RecordError
-from companion.replay.replay import ReplayObserver, ReplayResult
+from companion.replay.replay import ReplayObserver
 from companion.viewer.report_csv import FILES, CsvReport
 from companion.viewer.report_data import ReportWatch, as_json, counted, joined, named, run_of
 from companion.viewer.report_film import Film, FilmError, check_ffmpeg, write_gif, write_mp4
@@ -128,6 +128,7 @@ def _check(records: Sequence[Record], forms: Forms) -> None:
 def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
     """Run the first record again, and write what was asked for; then the others, to compare."""
     first = records[0]
+    _refuse_silent(first)
     clock, tally = record_clock(first), RunTally()
     watched = None if (forms.page or forms.gif or forms.mp4) is None else ReportWatch(first)
     observers: list[ReplayObserver] = [tally, *([] if watched is None else [watched])]
@@ -143,7 +144,6 @@ def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
             stack.callback(messages.close)
             observers.append(messages)
         result = watched_replay(first, *observers)
-        _refuse_silent(first, result)
     runs = named([run_of(first, tally, result), *(counted(one, watched_replay) for one in records[1:])])
     if forms.csv is not None:
         typer.echo(f"tables: {forms.csv} ({', '.join(FILES)})")
@@ -173,16 +173,16 @@ def write_report(record: Record, file: Path) -> str:
 
     Raises RecordError, MapError, OutputError.
     """
+    _refuse_silent(record)
     tally, watched = RunTally(), ReportWatch(record)
     result = watched_replay(record, tally, watched)
-    _refuse_silent(record, result)
     run = named([run_of(record, tally, result)])[0]
     return _page_written(record, joined(record, watched, run, []), file)
 
 
-def _refuse_silent(record: Record, result: ReplayResult) -> None:
-    """Raises RecordError where no autopilot was heard."""
-    if result.heard == 0:
+def _refuse_silent(record: Record) -> None:
+    """Raises RecordError where no autopilot was heard, before any file is made."""
+    if not any(tick.heard for tick in record.ticks()):
         raise RecordError(f"{record.directory}: no packet of an autopilot is in it; there is nothing to show")
 
 

@@ -12,11 +12,12 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from companion.viewer.earlier_track import EarlierTrack
 from companion.viewer.wire import Place, tile_message, tiles_in
 
 PAST_S = 600.0
 EVERY_S = 1.0
-"""One frame a second is kept for those who come later, for so long."""
+"""One frame a second is kept for those who come later, for so long; of what was before only the track."""
 NEWS_KEPT = 500
 TILES_AT_ONCE = 200
 KEPT_OF_PAST = ("kind", "t", "pose", "speed", "state", "figures", "statuses")
@@ -61,7 +62,7 @@ class Spectator:
             told.append(json.dumps({**board.scene, **acts}))
             if self._past:
                 self._past = False
-                told.append(json.dumps({"kind": "past", "frames": board.past_frames}))
+                told.append(json.dumps(board.past_message))
                 self._news = board.news_count
         told += [json.dumps(self._answers.popleft()) for _ in range(len(self._answers))]
         out: list[str | bytes] = [*told]
@@ -85,9 +86,9 @@ class LiveBoard:
         self.frame_count = 0
         self.tiles: dict[Place, bytes] = {}
         self.past: deque[Json] = deque(maxlen=round(PAST_S / EVERY_S))
+        self.earlier = EarlierTrack()
         self.news_count = 0
         self._news: deque[Json] = deque(maxlen=NEWS_KEPT)
-        self._past_news: list[Json] = []
         self._past_s = -EVERY_S
         self._spectators: set[Spectator] = set()
 
@@ -111,11 +112,14 @@ class LiveBoard:
         return list(self._news)[len(self._news) - missed :] if missed > 0 else []
 
     @property
-    def past_frames(self) -> list[Json]:
-        """One frame a second, and at the end the newest one if there have been news since the last of them."""
-        if self.frame is None or not self._past_news:
-            return list(self.past)
-        return [*self.past, self._kept(self.frame)]
+    def past_message(self) -> Json:
+        """What a browser that comes now has missed: the track, the news, and one frame a second of the last while."""
+        return {
+            "kind": "past",
+            "track": self.earlier.places,
+            "news": list(self._news),
+            "frames": list(self.past),
+        }
 
     def take(self, message: Json) -> None:
         """A scene or a frame of the run."""
@@ -146,15 +150,11 @@ class LiveBoard:
         news = frame["news"]
         self._news.extend(news)
         self.news_count += len(news)
-        self._past_news += news
         if not 0.0 <= frame["t"] - self._past_s < EVERY_S:
             self._past_s = frame["t"]
-            self.past.append(self._kept(frame))
-            self._past_news = []
-
-    def _kept(self, frame: Json) -> Json:
-        """What is kept of it, with the news since the last that was kept."""
-        return {**{key: frame[key] for key in KEPT_OF_PAST}, "news": self._past_news[-NEWS_KEPT:]}
+            if len(self.past) == self.past.maxlen:
+                self.earlier.add(self.past[0])
+            self.past.append({key: frame[key] for key in KEPT_OF_PAST})
 
     def _wake(self) -> None:
         for spectator in self._spectators:

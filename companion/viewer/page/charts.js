@@ -8,6 +8,7 @@ import { elapsed, lasting, number } from "viewer/words.js";
 
 const EVERY_MS = 500;
 const HEIGHT = 92;
+const HALF_MARK_PX = 18;
 const STEPS_S = [5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 18000];
 
 export class Charts {
@@ -27,10 +28,6 @@ export class Charts {
     const body = make("div", { class: "chart-body" });
     const node = make("div", { class: "chart" }, make("h3", {}, kind.name, " ", value), body);
     return { kind, index, value, body, node, plot: null };
-  }
-
-  get begin() {
-    return this.model.figures.times[0] ?? 0;
   }
 
   get seen() {
@@ -70,7 +67,7 @@ export class Charts {
             space: 60,
             gap: 2,
             splits: (each) => this.splits(each),
-            values: (_, marks) => marks.map((t) => this.mark(t)),
+            values: (each, marks) => marks.map((t) => this.mark(each, t)),
           },
           { ...axis, size: 34, space: 26, gap: 3 },
         ],
@@ -84,9 +81,10 @@ export class Charts {
     return plot;
   }
 
-  // Live: how long ago. A record: the time since its beginning.
-  mark(t) {
-    if (this.jump) return elapsed(t - this.begin + 0.001);
+  // Live: how long ago. A record: the time since its beginning. None stands below the axis, where zero does.
+  mark(plot, t) {
+    if (plot.valToPos(t, "x") < HALF_MARK_PX) return "";
+    if (this.jump) return elapsed(t + 0.001);
     const ago = Math.round((this.model.figures.times.at(-1) ?? t) - t);
     return ago < 1 ? (this.stale ? "last" : "now") : ago < 60 || ago % 60 ? `−${lasting(ago)}` : `−${ago / 60} min`;
   }
@@ -97,7 +95,7 @@ export class Charts {
     if (!(max > min)) return [];
     const step = STEPS_S.find((each) => (max - min) / each <= width / 80) ?? STEPS_S.at(-1);
     const first = this.jump
-      ? this.begin + Math.ceil((min - this.begin) / step) * step
+      ? Math.ceil(min / step) * step
       : max - Math.floor((max - min) / step) * step;
     return Array.from({ length: Math.min(20, Math.floor((max - first) / step + 1.001)) }, (_, i) => first + i * step);
   }

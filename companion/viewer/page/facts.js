@@ -18,7 +18,7 @@ export function readouts(frame) {
     [
       Number.isFinite(rest) ? "to go" : "to goal",
       goal ? metres(far).replace(/ .*/, "") : UNKNOWN,
-      far >= 9999.5 ? "km" : "m",
+      goal ? (far >= 9999.5 ? "km" : "m") : "",
     ],
     ["mode", frame?.mode ?? UNKNOWN, ""],
   ];

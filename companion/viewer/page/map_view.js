@@ -97,7 +97,7 @@ export class MapView {
       const { south_m: south, west_m: west, cell_m: cell, rows, columns } = map.shape;
       places.push([south, west], [south + rows * cell, west + columns * cell]);
     }
-    if (!scene?.home && !map.shape) places.push(...this.sight());
+    if (scene?.truth || (!scene?.home && !map.shape)) places.push(...this.sight());
     return places;
   }
 }

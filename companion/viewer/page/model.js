@@ -45,7 +45,7 @@ export class Model {
   /** Takes a message of the source; unknown kinds are left alone, so an older page works with a newer source. */
   take(message) {
     if (message.kind === "scene") this.takeScene(message);
-    else if (message.kind === "past") this.takePast(message.frames ?? []);
+    else if (message.kind === "past") this.takePast(message);
     else if (message.kind === "frame") this.takeFrame(message);
     else return;
     this.tell();
@@ -68,10 +68,18 @@ export class Model {
   }
 
   // After a lost connection the past overlaps with what is known; the rest of it fills the gap.
-  takePast(frames) {
+  takePast({ frames = [], track = [], news = [] }) {
     const last = frames.at(-1);
     if (last && last.t < this.lastT - BACK_S) this.forget();
-    for (const frame of frames) this.follow({ ...frame, news: frame.news?.filter((one) => !this.knows(one)) });
+    // Of what was before these frames only the track is told, as fewer places.
+    for (const [t, ...seen] of track) {
+      if (!(t > this.lastT)) continue;
+      if (seen.length) this.track.add(t, ...seen);
+      else this.track.interrupt();
+      this.lastT = t;
+    }
+    for (const frame of frames) this.follow(frame);
+    this.addNews(news.filter((one) => !this.knows(one)));
   }
 
   knows({ t, text }) {
@@ -81,6 +89,7 @@ export class Model {
   takeFrame(frame) {
     if (frame.t < this.lastT - BACK_S) this.forget();
     this.follow(frame);
+    this.addNews(frame.news ?? []);
     this.frame = frame;
   }
 
@@ -90,9 +99,11 @@ export class Model {
     if (frame.pose) this.track.add(frame.t, frame.pose[0], frame.pose[1], frame.speed);
     this.figures.add(frame);
     this.lastT = frame.t;
-    if (!frame.news?.length) return;
-    this.news.push(...frame.news);
-    this.newsCount += frame.news.length;
+  }
+
+  addNews(news) {
+    this.news.push(...news);
+    this.newsCount += news.length;
     if (this.news.length > NEWS_KEPT) this.news = this.news.slice(-NEWS_KEPT);
   }
 }

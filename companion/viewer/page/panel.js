@@ -77,7 +77,7 @@ export class Panel {
       setAttribute(row.node, "data-kind", now ? "now" : kindOf(status));
       setIcon(row.sign, now ? "now" : ({ skipped: "skip" }[kindOf(status)] ?? kindOf(status)));
       setText(row.status, now ? "going there" : ended && status === "pending" ? "not reached" : status);
-      setText(row.far, frame?.pose ? metres(distance(frame.pose, target.place)) : "");
+      setText(row.far, frame?.pose && status === "pending" ? metres(distance(frame.pose, target.place)) : "");
     });
     const known = `Targets, ${reached} of ${scene?.targets?.length} reached`;
     const first = frame?.goal?.asked === true && !ended;

@@ -75,9 +75,9 @@ export class Timeline {
     const { playback, record } = this;
     if (document.activeElement !== this.slider || Number(this.slider.value) !== playback.t)
       this.slider.value = playback.t;
-    setAttribute(this.slider, "aria-valuetext", elapsed(playback.t - playback.begin));
+    setAttribute(this.slider, "aria-valuetext", elapsed(playback.t));
     const day = Number.isFinite(record.scene.began_unix_s) ? namedClock(playback.t, record.scene) : elapsed(playback.t);
-    setText(this.time, `${elapsed(playback.t - playback.begin)} of ${elapsed(playback.end - playback.begin)}`);
+    setText(this.time, `${elapsed(playback.t)} of ${elapsed(playback.end)}`);
     setAttribute(this.time, "title", day);
     setIcon(this.play, playback.playing ? "pause" : "play");
   }

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from companion.viewer.earlier_track import MOST
 from companion.viewer.live_board import NEWS_KEPT, PAST_S, TILES_AT_ONCE, LiveBoard, Spectator
 from companion.viewer.map_tiles import run_lengths
 from companion.viewer.wire import tile_message, tiles_in
@@ -47,8 +49,8 @@ def test_who_comes_late_is_told_scene_past_map_and_the_newest_frame() -> None:
     texts, places = heard(live.join(False, lambda: None))
     assert [text["kind"] for text in texts] == ["scene", "past", "frame"] and texts[0]["may_act"] is False
     past = texts[1]["frames"]
-    assert [one["t"] for one in past] == [*(float(second) for second in range(10)), 9.8] and "path" not in past[0]
-    told = [one["text"] for each in past for one in each["news"]]
+    assert [one["t"] for one in past] == [float(second) for second in range(10)] and "path" not in past[0]
+    told = [one["text"] for one in texts[1]["news"]]
     assert told == [f"news {step}" for step in range(50)] and texts[2]["t"] == 9.8 and texts[2]["news"] == []
     assert sorted(places) == [(column, 0) for column in range(TILES_AT_ONCE + 50)]
 
@@ -81,7 +83,7 @@ def test_a_scene_that_changes_costs_no_news() -> None:
     live.take({**SCENE, "map_epoch": 2})
     live.take(frame(0.8, "four"))
     texts, _ = heard(spectator)
-    assert [one["text"] for text in texts[1]["frames"] for one in text["news"]] == ["one", "two", "three", "four"]
+    assert [one["text"] for one in texts[1]["news"]] == ["one", "two", "three", "four"]
 
 
 def test_another_map_begins_with_its_scene() -> None:
@@ -93,6 +95,28 @@ def test_another_map_begins_with_its_scene() -> None:
     live.take_tiles(tile_message([((7, 7), RUNS)]))
     texts, places = heard(spectator)
     assert texts[0]["map_epoch"] == 2 and places == [(7, 7)]
+
+
+def test_who_comes_after_hours_is_told_the_whole_track() -> None:
+    live = board()
+    for second in range(20_000):
+        lost = second in range(5000, 5020)
+        live.take({**frame(float(second)), **({"pose": None} if lost else {})})
+    texts, _ = heard(live.join(False, lambda: None))
+    track, frames = texts[1]["track"], texts[1]["frames"]
+    assert len(track) <= MOST + 1 and track[0] == [0.0, 0.0, 0.0, 1.0]
+    times_s = [one[0] for one in track]
+    assert times_s == sorted(times_s) and max(later - one for one, later in pairwise(times_s)) <= 4.0
+    assert times_s[-1] + 1.0 == frames[0]["t"], "they join on"
+    assert all(one[1] == one[0] for one in track if len(one) == 4)
+    assert {one[0] for one in track if len(one) == 1} <= set(range(5000, 5020)) and any(len(one) == 1 for one in track)
+
+
+def test_a_clock_that_goes_back_begins_another_track() -> None:
+    live = board()
+    for second in (*range(1000), *range(700)):
+        live.take(frame(float(second)))
+    assert live.earlier.places[0][0] == 0.0 and live.earlier.places[-1][0] == 99.0
 
 
 def test_nothing_grows_without_bound() -> None:
