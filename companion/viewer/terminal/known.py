@@ -73,12 +73,14 @@ def path_ahead(companion: Companion, north_m: float = 0.0, east_m: float = 0.0) 
 
 
 def headline_of(companion: Companion, status: Status) -> Headline:
-    """In one line what is done, or why the rover stands and what it waits for."""
+    """In one line what is done, or why the rover stands and what it waits for; in the end, what it came to."""
     doing = doing_of(companion, status)
     left = _left_m(companion, status) if status.activity.phase is RunPhase.DRIVING else None
     to_go = "" if left is None else f", {left:.0f} m to go"
     why = f", {doing['why']}" if doing["why"] else ""
-    return Headline(f"{doing['line']}{to_go}{why}", MOODS.get(doing["state"], Mood.PLAIN))
+    is_over = doing["state"] == "ended" and not doing["why"]
+    came_to = f", {status.targets_reached} of {status.targets} targets reached" if is_over else ""
+    return Headline(f"{doing['line']}{to_go}{why}{came_to}", MOODS.get(doing["state"], Mood.PLAIN))
 
 
 def mission_section(companion: Companion, status: Status) -> Section:
