@@ -226,9 +226,12 @@ def _draw_rover(axes: Axes, run: Drive) -> None:
 
     truth, outline = run.simulator.truth, run.scenario.outline
     # Over the target's star: a small thing on most pictures.
-    style: dict[str, Any] = {"facecolor": "white", "edgecolor": "#202020", "zorder": 5, "label": "the rover at the end"}
+    name, edge = "the rover at the end", "#202020"
+    style: dict[str, Any] = {"facecolor": "white", "edgecolor": edge, "zorder": 5}
     if outline.radius_m > 0.0:
         axes.add_patch(Circle((truth.east_m, truth.north_m), outline.radius_m, **style))
+        # The legend would show a rectangle for any patch.
+        axes.plot([], [], "o", markerfacecolor="white", markeredgecolor=edge, label=name)
         return
     sine, cosine = math.sin(truth.heading_rad), math.cos(truth.heading_rad)
     front_m, rear_m, half_m = outline.front_m, outline.rear_m, outline.half_width_m
@@ -237,7 +240,7 @@ def _draw_rover(axes: Axes, run: Drive) -> None:
         (truth.east_m + ahead_m * sine + aside_m * cosine, truth.north_m + ahead_m * cosine - aside_m * sine)
         for ahead_m, aside_m in corners
     ]
-    axes.add_patch(Polygon(places, **style))
+    axes.add_patch(Polygon(places, label=name, **style))
 
 
 def _draw_places(figure: MapFigure, run: Drive) -> None:
