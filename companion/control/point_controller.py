@@ -251,6 +251,8 @@ def _look_or_blocked(path: ReferencePath, view: LocalView) -> ControlCommand:
         # It has looked, and nothing is there but ground between the beams: creep, up to the next obstacle.
         bearing = pose.point.bearing_rad(ahead)
         creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
+        # A rover that made way may stand farther from its path than it may be sent.
+        creep_m = min(creep_m, farthest_m(view.speed_m_s, settings, narrow=view.rover.narrow_sight))
         creep_m = _creeps_m(creep_m, bearing, view)
         if creep_m >= CREEPS_M:
             target = pose.point.moved(bearing, creep_m)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.control.braking import fastest_within_m, stopping_distance_m
+from companion.control.braking import farthest_m, fastest_within_m, stopping_distance_m
 from companion.control.controller import ControlCommand, Purpose
 from companion.control.local_view import LocalView
 from companion.control.point_controller import PointController, turn_to
@@ -18,9 +18,11 @@ from companion.control.reference_path import (
     STEP_M,
     ReferencePath,
 )
+from companion.control.setpoint_check import fault_of
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.map_queries import clearance_m, look_along
+from companion.mission.bounds import Bounds
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from tests.companion.control.test_reference_path import looked, northward
@@ -147,6 +149,22 @@ def test_with_thin_beams_it_creeps_a_little_at_a_time_where_there_is_no_wide_roo
     assert answer.purpose is Purpose.DRIVE and isinstance(answer.setpoint, GuidedPosition)
     distance_m = pose.point.distance_m(answer.setpoint.point)
     assert crept_m[0] <= distance_m <= crept_m[1]
+
+
+def test_with_thin_beams_a_rover_that_stands_aside_of_its_path_creeps_no_farther_than_it_may_be_sent():
+    """It had made way for a cart; the place 2.6 m away was refused, and it stood until that had gone."""
+    pose, ground = Pose(10.56, 10.56, 0.0, 0.0), Ground()
+    path, controller = northward(ground, pose.point.moved(math.pi / 2.0, 2.4)), PointController()
+    moment = view(ground, pose, rover=replace(ROVER, narrow_sight=True))
+    answer = controller.follow(path, moment)
+    while answer.purpose is Purpose.LOOK:  # having turned, one beam sees the way to the path and nothing beside it
+        pose = replace(pose, heading_rad=answer.setpoint.heading_rad)
+        ground.take(pose, scan(np.array([4.0]), np.zeros(1)), times=10)
+        moment = replace(moment, pose=pose)
+        answer = controller.follow(path, moment)
+    assert answer.purpose is Purpose.DRIVE
+    assert 0.8 < pose.point.distance_m(answer.setpoint.point) <= farthest_m(0.0, SETTINGS, narrow=True)
+    assert fault_of(answer.setpoint, moment, Bounds()) is None
 
 
 @pytest.mark.parametrize(
