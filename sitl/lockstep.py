@@ -149,6 +149,8 @@ class Report:
     """Those that the genetic algorithm answered with a curve of its own, and not a graph search."""
     stuck: int = 0
     distance_m: float = 0.0
+    drawn_ah: float = 0.0
+    """Charge from the battery, since the simulator was switched on."""
     collisions: int = 0
     contacts: list[dict[str, float | str]] = field(default_factory=list)
     """Each collision: time, place from the start, speed, with what."""
@@ -289,6 +291,7 @@ class Drive:
         report.refused = companion.mission_run.setpoint_check.refused.total()
         report.following = "" if companion.estimate is None else described(companion.estimate)
         report.distance_m = self.simulator.driven_m
+        report.drawn_ah = self.simulator.drawn_ah
         report.sim_time_s = self.simulator.time_s
         if companion.driver is not None:
             report.steps = companion.driver.tally.steps

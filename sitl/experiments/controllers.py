@@ -26,6 +26,7 @@ from sitl.experiments.experiment import (
     chosen_controllers,
     each,
 )
+from sitl.experiments.intervals import ratio_with_interval
 from sitl.experiments.off_model import off_model, parameters_for
 from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
 from sitl.generators.kinds import GroundKind
@@ -42,7 +43,6 @@ POINTS_RESOLUTION_M = 0.5
 """Fields for points, fine enough for gaps of 1.2 m; planned motions take what the outline needs."""
 REFERENCE_PLANNER = "theta-star"
 TIME_LIMIT_S = 600.0
-DRAWS = 2000
 ALL = "all"
 GROUNDS = (GroundKind.CLUTTER, GroundKind.ROOMS, GroundKind.YARD)
 SHORT = ("controller", "runs", "there", "touched", "refused", "pairs", "s", "points s", "ratio")
@@ -163,14 +163,6 @@ def _row(name: str, own: Sequence[GroundDrive], reference: dict[tuple[GroundKind
     if not len(pairs):
         return [*row, "-", "-", "-"]
     return [*row, f"{pairs[:, 0].mean():.1f}", f"{pairs[:, 1].mean():.1f}", ratio_with_interval(pairs)]
-
-
-def ratio_with_interval(pairs: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
-    """The first column's mean over the second's, with its 95 % interval by resampling rows."""
-    drawn_rows = np.random.default_rng(0).integers(len(pairs), size=(DRAWS, len(pairs)))
-    means = pairs[drawn_rows].mean(axis=1)
-    low, high = np.percentile(means[:, 0] / means[:, 1], (2.5, 97.5))
-    return f"{pairs[:, 0].mean() / pairs[:, 1].mean():.3f} ({low:.3f} to {high:.3f})"
 
 
 def run(options: Options, advance: Advance) -> ControllersReport:

@@ -1,7 +1,12 @@
-"""Driving times of several planners: the shipped missions in lock-step, with the rover's own dynamics."""
+"""Driving times of several planners: shipped missions and made grounds in lock-step, with the rover's own dynamics.
+
+Beside each: the same drives on the known map, and the time that nothing can beat.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -15,8 +20,8 @@ from companion.executive.warm_up import warm_up
 from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
-from companion.recording.recorder import NullRecorder
 from sitl.experiments import drawing
+from sitl.experiments.driving_courses import CourseDrive, drive
 from sitl.experiments.experiment import (
     Advance,
     ExperimentError,
@@ -27,11 +32,12 @@ from sitl.experiments.experiment import (
     shipped_missions,
     where_measured,
 )
+from sitl.experiments.intervals import mean_interval, ratio_with_interval
 from sitl.experiments.navigation import OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
-from sitl.experiments.results_page import markdown_table, terminal_table
-from sitl.lockstep import Drive, DriveOutcome, Report
+from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
+from sitl.generators.kinds import GroundKind
+from sitl.lockstep import DriveOutcome, Report
 from sitl.map_mission import mission_on_map
-from sitl.scenario import scenario_from_mission
 
 NAME = "driving"
 MISSIONS = (
@@ -42,28 +48,47 @@ MISSIONS = (
     "complex.toml",
     "dead-end.toml",
     "field.plan",
+    "ackermann.toml",
 )
-DRIVEN = ("hybrid", "bspline-ga", "astar", "theta-star", "dstar-lite", "dijkstra")
+KINDS = (GroundKind.CLUTTER, GroundKind.ROOMS, GroundKind.YARD, GroundKind.MAZE, GroundKind.FOREST)
+DRIVEN = ("hybrid", "bspline-ga", "theta-star", "dstar-lite")
 """What a rover would be driven with; the older genetic algorithms are compared field by field."""
-REFERENCES = ("astar", "theta-star")
+REFERENCE = "theta-star"
+KNOWN = f"{REFERENCE}, map known"
 PROBLEMS = 4
 MAP_RESOLUTION_M = 2.0
 """Field size of maps that do not say: wide enough for a rover of 0.35 m."""
-TIME_LIMIT_S = 1800.0
+ALL = "all"
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """All drives of one mission with one planner."""
+    """All drives of one course with one planner, in the order of their seeds. ``known``: with the map."""
 
     planner: str
-    mission: str
-    reports: tuple[Report, ...]
+    course: str
+    drives: tuple[CourseDrive, ...]
+    known: bool = False
+
+    @property
+    def name(self) -> str:
+        """Of its row."""
+        return KNOWN if self.known else self.planner
+
+    @property
+    def reports(self) -> list[Report]:
+        """What each drive came to."""
+        return [one.report for one in self.drives]
+
+    @property
+    def times_s(self) -> list[float]:
+        """From the first movement to the last, of each drive."""
+        return [report.driving_time_s for report in self.reports]
 
     @property
     def time_s(self) -> float:
         """Mean driving time."""
-        return float(np.mean([report.driving_time_s for report in self.reports]))
+        return float(np.mean(self.times_s))
 
     @property
     def steps(self) -> float:
@@ -79,23 +104,17 @@ class Series:
             for report in self.reports
         )
 
-    def row(self, best_s: float) -> list[str]:
-        """Figures for people; ``best_s``: the reference's time on this mission."""
-        reports = self.reports
-        return [
-            self.planner,
-            f"{self.time_s:.1f}",
-            f"{self.time_s / best_s:.3f}",
-            f"{np.mean([report.distance_m for report in reports]):.1f}",
-            f"{self.steps:.1f}",
-            f"{np.mean([report.return_steps for report in reports]):.1f}",
-            f"{self.missed}",
-            f"{sum(report.collisions for report in reports)}",
-            drawing.figures(float(np.median([1e3 * report.planning_time_s for report in reports]))),
-        ]
+    @property
+    def bound_s(self) -> float:
+        """Mean of the times that nothing can beat; NaN where that was not asked for."""
+        return float(np.mean([math.nan if one.bound_s is None else one.bound_s for one in self.drives]))
 
 
-HEAD = ("planner", "time s", "/ref", "metres", "steps", "back", "missed", "coll.", "plan ms")
+HEAD = (
+    "planner", "time s", f"/ {REFERENCE}", "/ known", "/ bound", "metres", "back", "missed", "coll.", "Ah", "by curves",
+    "plan ms",
+)  # fmt: skip
+SHORT = ("planner", "s", "/ref", "/known", "/bound", "m", "back", "missed", "coll.", "Ah", "curves", "ms")
 
 
 @dataclass(frozen=True)
@@ -107,9 +126,9 @@ class DrivingReport(ExperimentReport):
     series: tuple[Series, ...]
 
     def tables(self) -> list[Table]:
-        """One for each mission, a row a planner, then the sums."""
-        named = [terminal_table(f"{NAME}: {name}", HEAD, self._rows(name)) for name in self._names()]
-        return [*named, terminal_table(f"{NAME}: all missions together", SUM_HEAD, self._sums())]
+        """One for each course, a row a planner, then all of them together."""
+        names = (*self._courses(), ALL)
+        return [terminal_table(f"{NAME}: {name}", SHORT, without_intervals(self._rows(name))) for name in names]
 
     def as_json(self) -> dict[str, object]:
         """Every drive's figures."""
@@ -118,8 +137,13 @@ class DrivingReport(ExperimentReport):
             "seed": self.options.seed,
             "runs": self.options.runs,
             "results": [
-                {"planner": s.planner, "mission": s.mission, "drives": [report.as_json() for report in s.reports]}
-                for s in self.series
+                {
+                    "planner": one.planner,
+                    "course": one.course,
+                    "known": one.known,
+                    "drives": [{**drive.report.as_json(), "bound_s": drive.bound_s} for drive in one.drives],
+                }
+                for one in self.series
             ],
         }
 
@@ -127,98 +151,123 @@ class DrivingReport(ExperimentReport):
         """See ``ExperimentReport``."""
         return {NAME: self._draw()}
 
-    def _names(self) -> list[str]:
-        return list(dict.fromkeys(series.mission for series in self.series))
+    def _courses(self) -> list[str]:
+        return list(dict.fromkeys(series.course for series in self.series))
 
-    def _planners(self) -> list[str]:
-        return list(dict.fromkeys(series.planner for series in self.series))
-
-    def _rows(self, name: str) -> list[list[str]]:
-        own = [series for series in self.series if series.mission == name]
-        references = [s.time_s for s in own if s.planner in REFERENCES] or [s.time_s for s in own]
-        return [series.row(min(references)) for series in own]
-
-    def _sums(self) -> list[list[str]]:
-        sums = {p: sum(s.time_s for s in self.series if s.planner == p) for p in self._planners()}
-        reference_s = min([sums[p] for p in REFERENCES if p in sums] or sums.values())
-        return [
-            [
-                planner,
-                f"{total_s:.1f}",
-                f"{total_s / reference_s:.3f}",
-                f"{sum(s.missed for s in self.series if s.planner == planner)}",
-                f"{sum(r.collisions for s in self.series if s.planner == planner for r in s.reports)}",
-            ]
-            for planner, total_s in sums.items()
-        ]
+    def _rows(self, course: str) -> list[list[str]]:
+        own = _joined(self.series) if course == ALL else [one for one in self.series if one.course == course]
+        reference = next((one for one in own if one.planner == REFERENCE and not one.known), own[0])
+        known = next(one for one in own if one.known)
+        bound = ["bound", f"{known.bound_s:.1f}", *_over(known.bound_s, reference, known), *[""] * (len(HEAD) - 5)]
+        return [*(_row(one, reference, known) for one in own), bound]
 
     def _draw(self) -> Figure:
-        names, planners = self._names(), self._planners()
-        figure = Figure(figsize=(11.0, 4.6), layout="constrained", dpi=110)
+        names = self._courses()
+        rows = list(dict.fromkeys(series.name for series in self.series))
+        figure = Figure(figsize=(12.0, 5.0), layout="constrained", dpi=110)
         panel = figure.subplots()
-        colours = (drawing.BLUE, drawing.ORANGE, drawing.GREY, drawing.RED, drawing.GREEN, "#7b5ea7")
-        width = 0.8 / len(planners)
-        for i, planner in enumerate(planners):
-            own = {s.mission: s for s in self.series if s.planner == planner}
-            places = np.arange(len(names)) + (i - (len(planners) - 1) / 2) * width
-            panel.bar(
-                places,
-                [own[name].time_s for name in names],
-                width * 0.9,
-                label=planner,
-                color=colours[i % len(colours)],
-            )
+        colours = (drawing.BLUE, drawing.ORANGE, drawing.RED, drawing.GREEN, "#7b5ea7", "#5f8aa8", "#a07d4c")
+        width = 0.8 / len(rows)
+        for i, row in enumerate(rows):
+            own = {one.course: one for one in self.series if one.name == row}
+            places = np.arange(len(names)) + (i - (len(rows) - 1) / 2) * width
+            colour = drawing.GREY if row == KNOWN else colours[i % len(colours)]
+            panel.bar(places, [own[name].time_s for name in names], width * 0.9, label=row, color=colour)
             for place, name in zip(places, names, strict=True):
-                times_s = [report.driving_time_s for report in own[name].reports]
-                panel.plot([place, place], [min(times_s), max(times_s)], color="0.2", linewidth=1.0)
-        panel.set_xticks(range(len(names)), names, rotation=15, fontsize=8)
-        panel.set_ylabel("driving time, s (mean, least and most)")
+                low_s, high_s = mean_interval(own[name].times_s)
+                panel.plot([place, place], [low_s, high_s], color="0.2", linewidth=1.0)
+        bounds_s = [next(one.bound_s for one in self.series if one.course == name and one.known) for name in names]
+        middles = np.arange(len(names))
+        panel.hlines(bounds_s, middles - 0.42, middles + 0.42, color="0.1", linewidth=1.6, label="bound")
+        panel.set_xticks(range(len(names)), names, rotation=20, fontsize=8, ha="right")
+        panel.set_ylabel("driving time, s (mean, 95 % interval)")
         panel.spines[["top", "right"]].set_visible(False)
-        figure.legend(loc="outside lower center", ncols=len(planners), frameon=False)
+        figure.legend(loc="outside lower center", ncols=len(rows) + 1, frameon=False)
         return figure
 
     def section(self) -> str:
         """See ``ExperimentReport``."""
-        tables = "\n\n".join(f"{name}:\n\n{markdown_table(HEAD, self._rows(name))}" for name in self._names())
+        courses = self._courses()
+        tables = "\n\n".join(f"{name}:\n\n{markdown_table(HEAD, self._rows(name))}" for name in courses)
+        runs, first = self.options.runs, self.options.seed
         return f"""## What the rover feels: driving times
 
 `{self.options.command(NAME)}`
 
-The shipped missions in lock-step, with the rover's dynamics and sensor noise, with several planners in the navigator;
-each row is made of {self.options.runs} drives, with seeds {self.options.seed} to
-{self.options.seed + self.options.runs - 1}. *time* is the mean driving time, */ref* the same divided by the faster of
-`{REFERENCES[0]}` and `{REFERENCES[1]}`; *missed* counts drives in which a target was not reached.
+Shipped missions and random grounds (*made*) in lock-step, with the rover's dynamics and sensor noise, led by points,
+with several planners in the navigator. Each row is made of {runs} drives, with seeds {first} to {first + runs - 1},
+the same for all; each seed is another ground of its kind. *time s*: mean driving time; */ {REFERENCE}*: the same over
+that planner's, pair by pair; in brackets 95 % intervals, by resampling seeds. *{KNOWN}*: the whole map is known from
+the start, so nothing need be explored; */ known*: the time over that one. *bound*: the shortest way of the footprint at
+cruise speed, any angle, and the stays: nothing can be faster; fences do not count. So the first line's last quotient is
+what planning could gain at all. *back*: steps in return mode; *missed*: drives in which a target was not reached; *Ah*:
+charge from the battery; *by curves*: the share of searches that the genetic algorithm answered with a curve of its own,
+where a graph search did not have to.
 
 {tables}
 
-All missions together:
+All together:
 
-{markdown_table(SUM_HEAD, self._sums())}
+{markdown_table(HEAD, self._rows(ALL))}
 
 {shortfalls(self.series)}
 
-Driving times do not depend on the computer; plan (all planning of a drive, ms) was measured on {where_measured()}.
+Driving times do not depend on the computer; plan ms (all planning of a drive) was measured on {where_measured()}.
 
 ![Driving times](images/{NAME}.png)
 """
 
 
+def _row(one: Series, reference: Series, known: Series) -> list[str]:
+    """Figures for people."""
+    reports = one.reports
+    low_s, high_s = mean_interval(one.times_s)
+    searches = sum(report.searches for report in reports)
+    curves = sum(report.genetic_searches for report in reports)
+    pairs = np.column_stack((one.times_s, reference.times_s))
+    return [
+        one.name,
+        f"{one.time_s:.1f} ({low_s:.1f} to {high_s:.1f})",
+        "1" if one is reference else ratio_with_interval(pairs),
+        *_over(one.time_s, reference, known)[1:],
+        f"{np.mean([report.distance_m for report in reports]):.1f}",
+        f"{np.mean([report.return_steps for report in reports]):.1f}",
+        f"{one.missed}",
+        f"{sum(report.collisions for report in reports)}",
+        f"{np.mean([report.drawn_ah for report in reports]):.3f}",
+        f"{curves / searches:.2f}" if curves else "-",
+        drawing.figures(float(np.median([1e3 * report.planning_time_s for report in reports]))),
+    ]
+
+
+def _over(time_s: float, reference: Series, known: Series) -> list[str]:
+    return [f"{time_s / other_s:.3f}" for other_s in (reference.time_s, known.time_s, known.bound_s)]
+
+
+def _joined(series: Sequence[Series]) -> list[Series]:
+    """One series a row, of all courses."""
+    drives: dict[tuple[str, bool], list[CourseDrive]] = {}
+    for one in series:
+        drives.setdefault((one.planner, one.known), []).extend(one.drives)
+    return [Series(planner, ALL, tuple(own), known) for (planner, known), own in drives.items()]
+
+
 def shortfalls(series: tuple[Series, ...]) -> str:
-    """What was aimed at, and every mission where it is not reached, in words; empty if ``hybrid`` was not driven."""
-    own = {(s.planner, s.mission): s for s in series}
+    """What was aimed at, and every course where it is not reached, in words; empty if ``hybrid`` was not driven."""
+    own = {(s.planner, s.course): s for s in series if not s.known}
     slower, longer = [], []
-    for one in (s for s in series if s.planner == OURS):
-        references = [own[p, one.mission].time_s for p in REFERENCES if (p, one.mission) in own]
-        if references and one.time_s > min(references):
-            slower.append(f"{one.mission} ({one.time_s / min(references):.3f})")
-        steps = own.get((STEPS_REFERENCE, one.mission))
+    for one in (s for s in own.values() if s.planner == OURS):
+        reference = own.get((REFERENCE, one.course))
+        if reference is not None and one.time_s > reference.time_s:
+            slower.append(f"{one.course} ({one.time_s / reference.time_s:.3f})")
+        steps = own.get((STEPS_REFERENCE, one.course))
         if steps is not None and one.steps > STEPS_FACTOR * steps.steps:
-            longer.append(f"{one.mission} ({one.steps / steps.steps:.3f})")
-    missed = sum(s.missed for s in series if s.planner == OURS)
-    if not any(s.planner == OURS for s in series):
+            longer.append(f"{one.course} ({one.steps / steps.steps:.3f})")
+    missed = sum(s.missed for s in own.values() if s.planner == OURS)
+    if not any(planner == OURS for planner, _ in own):
         return ""
     return (
-        f"Aimed at with `{OURS}` on every mission: no more time than the faster of the references"
+        f"Aimed at with `{OURS}` on every course: no more time than `{REFERENCE}`"
         f" ({_misses(slower)}); at most {STEPS_FACTOR:g} times the steps of `{STEPS_REFERENCE}` ({_misses(longer)});"
         f" no target missed ({f'{missed} missed' if missed else 'reached'})."
     )
@@ -228,32 +277,24 @@ def _misses(missed: list[str]) -> str:
     return f"not reached: {', '.join(missed)}" if missed else "reached"
 
 
-SUM_HEAD = ("planner", "time s", "/ref", "missed", "coll.")
-
-
 def run(options: Options, advance: Advance) -> DrivingReport:
     """Make all drives. The result (but for planning times) does not depend on ``jobs``."""
-    missions = {**_shipped(options), **_given(options)}
+    courses: dict[str, Mission | str] = {**_shipped(options), **{f"made {kind}": kind.value for kind in KINDS}}
+    courses |= _given(options)
     planners = planners_of(options, DRIVEN)
     for planner in planners:
         warm_up(settings_with(planner))
-    keys = [(name, planner) for name in missions for planner in planners]
-    tasks = [(name, planner, options.seed + i) for name, planner in keys for i in range(options.runs)]
-    collected: dict[tuple[str, str], list[Report]] = {key: [] for key in keys}
-    made = each(options.jobs, drive, ((missions[name], planner, seed) for name, planner, seed in tasks))
-    for done, ((name, planner, _), report) in enumerate(zip(tasks, made, strict=True), start=1):
-        collected[name, planner].append(report)
+    keys = [(name, planner, False) for name in courses for planner in planners]
+    keys += [(name, REFERENCE, True) for name in courses]
+    tasks = [(key, options.seed + i) for key in keys for i in range(options.runs)]
+    calls = ((courses[name], planner, seed, known) for (name, planner, known), seed in tasks)
+    collected: dict[tuple[str, str, bool], list[CourseDrive]] = {key: [] for key in keys}
+    made = each(options.jobs, drive, calls, options.keep)
+    for done, ((key, _), one) in enumerate(zip(tasks, made, strict=True), start=1):
+        collected[key].append(one)
         advance(done, len(tasks))
-    series = tuple(Series(planner, name, tuple(reports)) for (name, planner), reports in collected.items())
-    return DrivingReport(options, series)
-
-
-def drive(mission: Mission, planner: str, seed: int) -> Report:
-    """One mission in lock-step with this planner in the navigator."""
-    scenario = scenario_from_mission(mission)
-    report = Drive(mission, scenario, settings_with(planner), seed, NullRecorder(), TIME_LIMIT_S).run()
-    report.track.clear()
-    return report
+    series = (Series(planner, name, tuple(own), known) for (name, planner, known), own in collected.items())
+    return DrivingReport(options, tuple(series))
 
 
 def _shipped(options: Options) -> dict[str, Mission]:

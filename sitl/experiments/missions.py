@@ -25,6 +25,7 @@ from sitl.experiments.experiment import (
     chosen_controllers,
     each,
 )
+from sitl.experiments.intervals import mean_interval
 from sitl.experiments.off_model import off_model
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
@@ -138,12 +139,11 @@ seeds. With thin beams, and on arcs, points lead the rover whatever is asked for
 
 def _row(mission: str, controller: str, drives: Iterable[MissionDrive]) -> list[str]:
     own = list(drives)
-    times_s = np.array([one.seconds for one in own])
-    picks = np.random.default_rng(0).integers(len(own), size=(2000, len(own)))
-    low_s, high_s = np.percentile(times_s[picks].mean(axis=1), (2.5, 97.5))
+    times_s = [one.seconds for one in own]
+    low_s, high_s = mean_interval(times_s)
     counts = [sum(getattr(one, name) for one in own) for name in ("touched", "run_into", "refused", "missed")]
     spread = f"{low_s:.0f} to {high_s:.0f}" if controller else ""
-    return [mission, controller, f"{len(own)}", *map(str, counts), f"{times_s.mean():.1f}", spread]
+    return [mission, controller, f"{len(own)}", *map(str, counts), f"{np.mean(times_s):.1f}", spread]
 
 
 def run(options: Options, advance: Advance) -> MissionsReport:

@@ -10,11 +10,11 @@ from sitl.experiments.controllers import (
     GroundDrive,
     drive,
     mission_on,
-    ratio_with_interval,
     run,
     settings_for,
 )
 from sitl.experiments.experiment import ExperimentError, Options
+from sitl.experiments.intervals import ratio_with_interval
 from sitl.generators.canvas import EAST_M, NORTH_M
 from sitl.generators.kinds import GroundKind
 from sitl.generators.made_ground import BODY_M
