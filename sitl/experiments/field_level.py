@@ -99,10 +99,16 @@ def seen_from(truth: Weights, cell: Cell, view: View) -> NDArray[np.int64]:
 
 
 class FieldRobot:
-    """The robot on the ground ``truth``; its own map, ``known``, begins at the base weight everywhere."""
+    """The robot on the ground ``truth``; its own map, ``known``, begins at the base weight everywhere.
 
-    def __init__(self, truth: Grid, start: Cell, target: Cell, settings: Settings, seed: int) -> None:
+    ``layers``: of its view, beyond its own field.
+    """
+
+    def __init__(
+        self, truth: Grid, start: Cell, target: Cell, settings: Settings, seed: int, layers: int = LAYERS
+    ) -> None:
         self.truth = truth
+        self._layers = layers
         self.known = truth.with_weights(np.full(truth.weights.shape, BASE_WEIGHT))
         self.cell = start
         self.target = target
@@ -166,7 +172,7 @@ class FieldRobot:
     def _look(self) -> None:
         if self._heading == (0, 0):
             return
-        x, y = seen_from(self.truth.weights, self.cell, view_towards(*self._heading)).T
+        x, y = seen_from(self.truth.weights, self.cell, view_towards(*self._heading, self._layers)).T
         self.known.weights[y, x] = self.truth.weights[y, x]
 
     def _corner_is_cut(self, onward: Cell) -> bool:
@@ -182,19 +188,27 @@ def _next_field(decision: Decision, cell: Cell) -> Cell:
 
 
 def drive_fields(
-    truth: Grid, start: Cell, target: Cell, settings: Settings, seed: int, step_limit: int = STEP_LIMIT
+    truth: Grid,
+    start: Cell,
+    target: Cell,
+    settings: Settings,
+    seed: int,
+    step_limit: int = STEP_LIMIT,
+    layers: int = LAYERS,
 ) -> FieldRun:
     """One run over unknown ground; a function of its arguments (but for the times measured)."""
-    return FieldRobot(truth, start, target, settings, seed).drive(step_limit)
+    return FieldRobot(truth, start, target, settings, seed, layers).drive(step_limit)
 
 
-def measured_runs(truth: Grid, start: Cell, target: Cell, settings: Settings, seeds: range) -> list[FieldRun]:
+def measured_runs(
+    truth: Grid, start: Cell, target: Cell, settings: Settings, seeds: range, layers: int = LAYERS
+) -> list[FieldRun]:
     """One run for each seed. Neither loading compiled code nor a full collection counts as planning of some run."""
     _warm_up_once()
     collecting = gc.isenabled()
     gc.disable()
     try:
-        return [drive_fields(truth, start, target, settings, seed) for seed in seeds]
+        return [drive_fields(truth, start, target, settings, seed, layers=layers) for seed in seeds]
     finally:
         if collecting:
             gc.enable()

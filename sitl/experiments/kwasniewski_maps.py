@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -16,7 +16,7 @@ from rich.table import Table
 from companion.core.grid import Grid
 from companion.navigation.field_step import Part
 from companion.planning import registry
-from companion.settings import Settings, parse_settings
+from companion.settings import PlannerSettings, Settings, parse_settings
 from sitl.experiments import drawing
 from sitl.experiments.experiment import (
     START,
@@ -40,6 +40,30 @@ TITLES = {
     "rooms": "Map 3: rooms",
     "complex": "Map 4: complex environment",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One way to read the paper. ``layers``: of the view, beyond the robot's field; ``span_way_points``: see there."""
+
+    layers: int
+    span_way_points: int
+
+    @property
+    def view(self) -> str:
+        """In words."""
+        return f"field + {self.layers}"
+
+    @property
+    def way_points(self) -> str:
+        """In words: with 4, 5, 6 and 8 control points."""
+        return f"{WAY_POINTS}, 7, 9, 13" if self.span_way_points else f"always {WAY_POINTS}"
+
+
+WAY_POINTS = PlannerSettings().way_points
+OURS = Reading(LAYERS, PlannerSettings().span_way_points)
+READINGS = (OURS, Reading(LAYERS - 1, OURS.span_way_points), Reading(LAYERS, 0), Reading(LAYERS - 1, 0))
+"""The first is what the rest of this page takes. The paper's "4 layers" may count the robot's own field as one."""
 COLOURS = {"default": drawing.BLUE, "paper": drawing.ORANGE}
 RUNS_A_TASK = 5
 
@@ -51,6 +75,7 @@ class Series:
     profile: Profile
     map_name: str
     runs: tuple[FieldRun, ...]
+    reading: Reading = OURS
 
     def count(self, outcome: Outcome) -> int:
         """Runs that ended so."""
@@ -77,15 +102,24 @@ class MapsReport(ExperimentReport):
     options: Options
     maps: dict[str, Grid]
     series: tuple[Series, ...]
+    readings: tuple[Series, ...]
+    """Of the profile ``paper``, with each reading."""
 
     def tables(self) -> list[Table]:
-        """One for each profile, a row a map."""
-        return [
+        """One for each profile, a row a map, and one of the readings."""
+        named = [
             terminal_table(
                 f"{NAME}, profile {profile}, times in ms", HEAD, [_row(s) for s in self.series if s.profile == profile]
             )
             for profile in PROFILES
         ]
+        return [*named, terminal_table(f"{NAME}: readings", READING_HEAD, self.reading_rows())]
+
+    def reading_rows(self) -> list[list[str]]:
+        """A row for each reading and map."""
+        chosen = [0, 1, 3, 4, 5, 6]
+        rows = [(one.reading, _row(one)) for one in self.readings]
+        return [[reading.view, reading.way_points, *(row[i] for i in chosen)] for reading, row in rows]
 
     def as_json(self) -> dict[str, object]:
         """Every run's figures, in the order of their seeds."""
@@ -97,6 +131,7 @@ class MapsReport(ExperimentReport):
             "start": list(START),
             "target": list(TARGET),
             "results": [_series_json(series) for series in self.series],
+            "readings": [{**asdict(one.reading), **_series_json(one)} for one in self.readings],
         }
 
     def pictures(self) -> dict[str, Figure]:
@@ -150,29 +185,37 @@ class MapsReport(ExperimentReport):
 
 
 HEAD = ("map", "reached", "limit", "steps", "back", "searches", "plan", "max", "p99")
+READING_HEAD = ("view", "way points", "map", "reached", "steps", "back", "searches", "plan")
 
 
 def run(options: Options, advance: Advance) -> MapsReport:
     """Make all runs. The result (but for times) does not depend on ``jobs``."""
     maps = load_maps(options.maps, tuple(TITLES))
     registry.warm_up()  # here, so that the workers find everything compiled
-    keys = [(profile, name) for profile in PROFILES for name in maps]
+    keys = [(profile, name, OURS) for profile in PROFILES for name in maps]
+    keys += [("paper", name, reading) for reading in READINGS if reading != OURS for name in maps]
     seeds = range(options.seed, options.seed + options.runs)
     tasks = [(key, seeds[at : at + RUNS_A_TASK]) for key in keys for at in range(0, options.runs, RUNS_A_TASK)]
-    collected: dict[tuple[Profile, str], list[FieldRun]] = {key: [] for key in keys}
+    collected: dict[tuple[Profile, str, Reading], list[FieldRun]] = {key: [] for key in keys}
     done = 0
-    calls = ((maps[name], START, TARGET, profile_settings(profile), seeds) for (profile, name), seeds in tasks)
+    calls = (
+        (maps[name], START, TARGET, profile_settings(profile, reading), seeds, reading.layers)
+        for (profile, name, reading), seeds in tasks
+    )
     made = each(options.jobs, measured_runs, calls)
     for (key, _), runs in zip(tasks, made, strict=True):
         collected[key] += runs
         done += len(runs)
         advance(done, len(keys) * options.runs)
-    return MapsReport(options, maps, tuple(Series(*key, tuple(runs)) for key, runs in collected.items()))
+    series = [Series(profile, name, tuple(own), reading) for (profile, name, reading), own in collected.items()]
+    readings = [one for reading in READINGS for one in series if one.profile == "paper" and one.reading == reading]
+    return MapsReport(options, maps, tuple(one for one in series if one.reading == OURS), tuple(readings))
 
 
-def profile_settings(profile: Profile) -> Settings:
-    """The settings of a profile."""
-    return parse_settings({"profile": profile}, "profile")
+def profile_settings(profile: Profile, reading: Reading = OURS) -> Settings:
+    """The settings of a profile, with the way points of a reading."""
+    changed = {} if reading == OURS else {"planner": {"span_way_points": reading.span_way_points}}
+    return parse_settings({"profile": profile, **changed}, "profile")
 
 
 def _row(series: Series) -> list[str]:
@@ -256,6 +299,12 @@ in return mode) is the mean, limit counts the runs that reached the limit of ste
 function, searches included, took no longer than p99. Times are in milliseconds, without Python's garbage collection.
 
 {tables}
+
+The profile `paper` with other readings of the text. *view*: its "4 layers" may be four beyond the robot's field, as
+everywhere else here, or count that field as the first. *way points*: it evaluates five, whatever the number of control
+points; here a path with 5, 6 or 8 of them has 7, 9 or 13:
+
+{markdown_table(READING_HEAD, report.reading_rows())}
 
 The paper gives no table, only histograms of computing times in seconds (Python 3.6; its text names two of 189 s and 232
 s on map 3) and says that almost all tests reached the target. Measured on {where_measured()}.
