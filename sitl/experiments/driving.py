@@ -198,11 +198,11 @@ Shipped missions and random grounds (*made*) in lock-step, with the rover's dyna
 with several planners in the navigator. Each row is made of {runs} drives, with seeds {first} to {first + runs - 1},
 the same for all; each seed is another ground of its kind. *time s*: mean driving time; */ {REFERENCE}*: the same over
 that planner's, pair by pair; in brackets 95 % intervals, by resampling seeds. *{KNOWN}*: the whole map is known from
-the start, so nothing need be explored; */ known*: the time over that one. *bound*: the shortest way of the footprint at
-cruise speed, any angle, and the stays: nothing can be faster; fences do not count. So the first line's last quotient is
-what planning could gain at all. *back*: steps in return mode; *missed*: drives in which a target was not reached; *Ah*:
-charge from the battery; *by curves*: the share of searches that the genetic algorithm answered with a curve of its own,
-where a graph search did not have to.
+the start, as if all had been seen before; */ known*: the time over that one, which is what better exploring could gain
+at all. *bound*: the shortest way of the footprint at cruise speed, any angle, and the stays: nothing can be faster;
+fences do not count. *back*: steps in return mode; *missed*: drives in which a target was not reached; *Ah*: charge from
+the battery; *by curves*: the share of searches that the genetic algorithm answered with a curve of its own, and not a
+graph search.
 
 {tables}
 

@@ -6,17 +6,17 @@ Nouns: course.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
+from numpy.typing import NDArray
 
+from companion.app import Status
 from companion.core.frames import NedPoint
-from companion.core.grid import OBSTACLE, Cell, Grid, Weights, inflated
-from companion.mapping.map_files import save_ros_map
-from companion.mission.mission import HomePoint, Mission
+from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, inflated
+from companion.mapping.evidence_map import EvidenceMap, restore
+from companion.mission.mission import Mission
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import make_planner
 from companion.recording.recorder import NullRecorder
@@ -32,6 +32,8 @@ from sitl.world.truth import SimStart
 from sitl.world.world import World
 
 TIME_LIMIT_S = 1800.0
+TELL_S = 0.1
+"""So soon after its beginning a map is told."""
 FIELD_M = 0.25
 """Fields for the shortest way."""
 
@@ -53,11 +55,9 @@ def drive(course: Mission | str, planner: str, seed: int, known: bool = False) -
         mission, scenario = course, scenario_from_mission(course)
     else:
         mission, scenario = _on_made_ground(course, seed)
-    with TemporaryDirectory() as folder:
-        if known:
-            mission = _with_known_map(mission, scenario, Path(folder))
-        run = Drive(mission, scenario, settings_with(planner), seed, NullRecorder(), TIME_LIMIT_S)
-        report = run.run()
+    run = Drive(mission, scenario, settings_with(planner), seed, NullRecorder(), TIME_LIMIT_S)
+    told = _ToldMap(run) if known else None
+    report = run.run() if told is None else run.run(told.observe, TELL_S)
     report.track.clear()
     return CourseDrive(report, bound_s(run) if known else None)
 
@@ -70,13 +70,39 @@ def _on_made_ground(kind: str, seed: int) -> tuple[Mission, Scenario]:
     return mission, Scenario(ground.world, start, SENSORS, outline_of(mission.rover), parameters)
 
 
-def _with_known_map(mission: Mission, scenario: Scenario, folder: Path) -> Mission:
-    """The mission with the world's obstacles as the map that is known beforehand."""
-    world, start = scenario.world, scenario.start
-    weights = np.where(world.layers().solid.fields, OBSTACLE, 0.5)
-    save_ros_map(Grid(weights, world.resolution_m), folder / "known")
-    corner = HomePoint(world.south_m - start.north_m, world.west_m - start.east_m)
-    return replace(mission, prior_map=folder / "known.yaml", prior_resolution_m=world.resolution_m, prior_corner=corner)
+class _ToldMap:
+    """Tells the companion the true world once its map begins, as if it had seen all of it many times."""
+
+    def __init__(self, run: Drive) -> None:
+        self._run = run
+        self._evidence: EvidenceMap | None = None
+
+    def observe(self, status: Status) -> None:
+        """To be called now and then. Tells each new map once."""
+        executor = self._run.companion.mission_run.executor
+        if executor is None or executor.evidence is self._evidence:
+            return
+        self._evidence = evidence = executor.evidence
+        rows, columns = evidence.log_odds.shape
+        world, start, home = self._run.scenario.world, self._run.scenario.start, executor.progress.home.point
+        corner, size_m = evidence.base.south_west, evidence.evidence_m
+        south_m = start.north_m + corner.north_m - home.north_m
+        west_m = start.east_m + corner.east_m - home.east_m
+        solid = sampled(world, south_m, west_m, size_m, (rows, columns))
+        log_odds = np.where(solid, evidence.settings.limit, -evidence.settings.free_limit).astype(np.float32)
+        restore(evidence, log_odds, np.zeros_like(evidence.penalty))
+
+
+def sampled(world: World, south_m: float, west_m: float, field_m: float, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Where obstacles lie under the middles of fields; the corner in the world frame. Beyond the world nothing does."""
+    rows, columns = (np.arange(size) + 0.5 for size in shape)
+    solid = world.layers().solid.fields
+    south = np.floor((south_m + rows * field_m - world.south_m) / world.resolution_m).astype(int)
+    west = np.floor((west_m + columns * field_m - world.west_m) / world.resolution_m).astype(int)
+    on_south, on_west = (south >= 0) & (south < solid.shape[0]), (west >= 0) & (west < solid.shape[1])
+    found = np.zeros(shape, np.bool_)
+    found[np.ix_(on_south, on_west)] = solid[np.ix_(south[on_south], west[on_west])]
+    return found
 
 
 def bound_s(run: Drive) -> float:
@@ -117,18 +143,9 @@ class _Ground:
         self._west_m = min(*easts, world.west_m)
         rows = math.ceil((max(*norths, world.south_m + world.height_m) - self._south_m) / FIELD_M) + 1
         columns = math.ceil((max(*easts, world.west_m + world.width_m) - self._west_m) / FIELD_M) + 1
-        self._weights = inflated(self._sampled(world, rows, columns), max(half_m / FIELD_M - math.sqrt(0.5), 0.0))
-
-    def _sampled(self, world: World, rows: int, columns: int) -> Weights:
-        """What lies under the middle of each field."""
-        middle = np.arange(max(rows, columns)) + 0.5
-        south = np.floor((self._south_m + middle[:rows] * FIELD_M - world.south_m) / world.resolution_m).astype(int)
-        west = np.floor((self._west_m + middle[:columns] * FIELD_M - world.west_m) / world.resolution_m).astype(int)
-        solid = world.layers().solid.fields
-        on_south, on_west = (south >= 0) & (south < solid.shape[0]), (west >= 0) & (west < solid.shape[1])
-        weights = np.full((rows, columns), 0.5)
-        weights[np.ix_(on_south, on_west)] = np.where(solid[np.ix_(south[on_south], west[on_west])], OBSTACLE, 0.5)
-        return weights
+        solid = sampled(world, self._south_m, self._west_m, FIELD_M, (rows, columns))
+        weights = np.where(solid, OBSTACLE, BASE_WEIGHT)
+        self._weights = inflated(weights, max(half_m / FIELD_M - math.sqrt(0.5), 0.0))
 
     def way_m(self, start_m: tuple[float, float], target_m: tuple[float, float]) -> float:
         """The shortest way, any angle; NaN where there is none."""

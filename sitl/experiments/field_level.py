@@ -49,6 +49,8 @@ class FieldRun:
     steps: int = 0
     return_steps: int = 0
     searches: int = 0
+    by_curves: int = 0
+    """Searches that the genetic algorithm answered with a curve of its own, and not a graph search."""
     planning_s: float = 0.0
     step_seconds: list[float] = field(default_factory=list)
     track: list[Cell] = field(default_factory=list)
@@ -138,7 +140,7 @@ class FieldRobot:
             run.outcome = Outcome.REACHED
         elif decision.action is Action.UNREACHABLE:
             run.outcome = Outcome.UNREACHABLE
-        run.searches = len(self._searcher.seconds)
+        run.searches, run.by_curves = len(self._searcher.seconds), self._searcher.by_curves
         run.planning_s = float(np.sum(self._searcher.seconds))
         return run
 

@@ -48,7 +48,7 @@ def test_behind_walls_there_is_no_way() -> None:
     assert math.isnan(shortest_way_m(closed, [(5.0, 3.0), (5.0, 15.0)], 0.35))
 
 
-@pytest.mark.slow
+@pytest.mark.thorough
 def test_no_drive_beats_the_bound_and_on_the_known_map_it_is_nearer_to_it() -> None:
     unknown, known = drive("maze", "theta-star", 1), drive("maze", "theta-star", 1, known=True)
     assert known.bound_s is not None and unknown.bound_s is None

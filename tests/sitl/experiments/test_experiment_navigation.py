@@ -6,11 +6,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from companion.core.grid import Cell, empty_grid
 from companion.executive.mission_progress import TargetStatus
 from sitl.cli.commands import app
 from sitl.experiments import navigation
 from sitl.experiments.driving import Series, shortfalls
 from sitl.experiments.driving_courses import CourseDrive
+from sitl.experiments.field_level import FieldRun, Outcome
 from sitl.lockstep import DriveOutcome, Report
 
 MAP = """type octile
@@ -48,11 +50,10 @@ def figures_of(world: Path, name: str) -> dict[tuple[str, str], dict[str, object
 
 def test_navigation_drives_each_planner_through_given_maps(world: Path) -> None:
     once, again = figures_of(world, "one.json"), figures_of(world, "two.json")
-    assert set(once) == {
-        (p, m) for p in ("hybrid", "dstar-lite") for m in ("one-obstacle", "clutter", "rooms", "complex", "slit")
-    }
+    maps, kinds = ("one-obstacle", "clutter", "rooms", "complex", "slit"), [f"made {kind}" for kind in navigation.KINDS]
+    assert set(once) == {(p, m) for p in ("hybrid", "dstar-lite") for m in (*maps, *kinds)}
     for (planner, name), series in once.items():
-        runs = (2 if planner == "hybrid" else 1) * (2 if name == "slit" else 1)
+        runs = 2 if name in kinds else (2 if planner == "hybrid" else 1) * (2 if name == "slit" else 1)
         assert series["outcomes"] == ["reached"] * runs
         assert all(over >= 1.0 for over in series["steps_over_best"])  # type: ignore[attr-defined]
         for key in ("steps", "return_steps", "searches"):
@@ -96,8 +97,13 @@ def test_a_target_missed_counts_in_a_drive_with_a_collision_too() -> None:
 
 
 def test_every_shortfall_of_navigation_is_said() -> None:
-    ours = [navigation.Series("hybrid", name, (), over) for name, over in (("a", (1.0, 1.04)), ("b", (1.2, 1.3, 1.1)))]
-    other = [navigation.Series("dstar-lite", name, (), (1.0,)) for name in ("a", "b")]
+    def series(planner: str, name: str, *steps: int) -> navigation.Series:
+        ground = navigation.Ground(name, empty_grid(3, 3), Cell(0, 0), Cell(2, 2), 100)
+        runs = tuple(FieldRun(0, Outcome.REACHED, steps=each) for each in steps)
+        return navigation.Series(planner, name, runs, (ground,) * len(runs))
+
+    ours = [series("hybrid", "a", 100, 104), series("hybrid", "b", 120, 130, 110)]
+    other = [series("dstar-lite", name, 100) for name in ("a", "b")]
     assert "not reached: b (1.200)" in navigation.shortfalls((*ours, *other))
     assert navigation.shortfalls((ours[0], other[0])).endswith("(reached).")
     assert navigation.shortfalls(tuple(ours)) == ""
