@@ -24,8 +24,9 @@ def driven(planner: str, suite: str, seed: int) -> Drive:
     return run
 
 
-@pytest.mark.parametrize("suite", ["lidar-90", pytest.param("lidar-360", marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("planner", ["hybrid", pytest.param("vertex++", marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("suite", ["lidar-90", "lidar-360"])
+@pytest.mark.parametrize("planner", ["hybrid", "vertex++"])
 def test_crossing_is_driven_without_a_collision(planner: str, suite: str) -> None:
     run = driven(planner, suite, 0)
     assert run.simulator.collisions == ()

@@ -82,6 +82,7 @@ def test_sealed_target_is_reported_and_the_rover_comes_back(suite: str) -> None:
     assert any("Unreachable" in text for text in report.said)
 
 
+@pytest.mark.thorough
 def test_dead_end_needs_the_way_back() -> None:
     """A lucky first path may miss the dead end; of eight seeds one did, not this one."""
     report = driven("dead-end.toml", settings=parse_settings({"profile": "paper"}, "test"))
