@@ -28,6 +28,7 @@ EXPERIMENTS = (
     "missions",
     "barn",
     "controllers",
+    "traffic",
     "gates",
     "wang-table4",
     "sedighi-table1",
@@ -39,7 +40,7 @@ ON_ANY_MAP = ("navigation", "driving")
 OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
 WITH_CONTROLLERS = ("barn", "controllers", "gates", "killed-companion", "missions")
 WITH_MISMATCH = ("barn", "controllers", "gates", "killed-companion", "missions")
-DRIVES = ("barn", "controllers", "dead-companion", "driving", "gates", "killed-companion", "missions")
+DRIVES = ("barn", "controllers", "dead-companion", "driving", "gates", "killed-companion", "missions", "traffic")
 WITH_GUARD = ("killed-companion", "missions")
 EXIT_FAILED = 3
 LINES = 10
