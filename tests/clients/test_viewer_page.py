@@ -156,6 +156,8 @@ def test_the_simulator_alone_is_shown_as_such(tmp_path: Path) -> None:
             shown.open(address_of(companion))
             shown.shows("Depot", "live", "Driving to", "Targets")
             assert "simulat" not in shown.text, "for the companion it is a rover like any other"
+            assert clock_of(shown).endswith(" UTC"), "a time of day, and which"
+            assert re.fullmatch(r"driving to .* · Depot", str(shown.run("return document.title")))
             assert shown.faults == []
             companion.child.send_signal(signal.SIGINT)
             shown.shows("Stopped by the user")
@@ -172,7 +174,10 @@ def test_a_report_plays_from_its_file_to_its_end(tmp_path: Path) -> None:
     assert file.stat().st_size < 2_000_000 and not re.search(r"(src|href)=\"(?!data:)", text)
     with page(DESKTOP) as report:
         report.open(file.as_uri())
-        report.shows("record, simulated", "Done", "1 of 1 targets reached")
+        report.shows("record, simulated", "Done", "1 of 1 targets reached", "Mission ended")
+        said = [report.text.index(text) for text in ("Mission ended", "Reached far end", "Heading for far end")]
+        assert said == sorted(said), "what is new stands first"
+        title = report.run("return document.title")
         report.press("Tables")
         report.shows("Targets", "reached", "Stops and waits")
         report.press("Decisions")
@@ -183,6 +188,7 @@ def test_a_report_plays_from_its_file_to_its_end(tmp_path: Path) -> None:
                    "s.dispatchEvent(new Event('change', {bubbles: true}))")  # fmt: skip
         report.press("Play or pause (Space)")
         report.shows("Done")
+        assert report.run("return document.title") == title, "a report keeps the title of its file"
         report.press("What the signs mean (L)")
         report.shows("stop on the way")
         report.press("What the signs mean (L)")
