@@ -32,7 +32,7 @@ from companion.mission.bounds import Bound
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Part
 from companion.safety.mode_latch import Control
-from companion.safety.reasons import EndReason, LatchReason, RunPhase
+from companion.safety.reasons import Activity, EndReason, LatchReason, RunPhase, WaitReason
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.events import RoverMode
 from companion.vehicle.state import VehicleState
@@ -220,7 +220,7 @@ def doing_of(companion: Companion, status: Status) -> Json:
         if not why and companion.executor is not None and companion.executor.driver.makes_way:
             why = MAKES_WAY
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
-        line, why = f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
+        line, why = _stopped(activity)
     elif activity.phase is RunPhase.WAITING:
         line, _, why = line.partition(" (")
         why = why.removesuffix(")")
@@ -232,6 +232,14 @@ def doing_of(companion: Companion, status: Status) -> Json:
     elif state == "ended":
         line, why = _ended(companion, line)
     return {"line": line, "why": why, "state": state}
+
+
+def _stopped(activity: Activity) -> tuple[str, str]:
+    """Why it stands, and what for. Data that is missing comes before the mode: mostly the one has led to the other."""
+    if activity.awaited is not None and activity.awaited.kind is WaitReason.GOOD_DATA_AND:
+        data, person = activity.awaited.figures
+        return f"stopped: {data}", f"waiting for good data and {person}"
+    return f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
 
 
 def _driven_by(companion: Companion) -> str:

@@ -130,13 +130,13 @@ export function drawRover(pen, scene, pose) {
   context.translate(x, y);
   context.rotate(pose[2] - camera.up);
   context.beginPath();
-  context.moveTo(0, -half);
-  context.lineTo(half * 0.68, half * 0.72);
-  context.lineTo(0, half * 0.4);
-  context.lineTo(-half * 0.68, half * 0.72);
+  context.moveTo(0, -half * 1.2);
+  context.lineTo(half * 0.6, half * 0.8);
+  context.lineTo(0, half * 0.35);
+  context.lineTo(-half * 0.6, half * 0.8);
   context.closePath();
   context.lineJoin = "round";
-  pen.stroke(colours.roverEdge, 4);
+  pen.stroke(colours.roverEdge, 3);
   context.fillStyle = colours.rover;
   context.fill();
   context.restore();

@@ -81,6 +81,8 @@ def test_each_kind_of_setpoint_is_told(setpoint: object, told: dict) -> None:
 DRIVING = Activity(RunPhase.DRIVING)
 NOT_OURS = Reason(LatchReason.OTHER_MODE, ("GUIDED",))
 HELD = Activity(RunPhase.STOPPED_AND_WAITING, NOT_OURS, Reason(WaitReason.PERSON_SETS_MODE, ("X",)))
+BLIND = Reason(WaitReason.GOOD_DATA_AND, (Reason(Doubt.DATA_OLD, ("range data", 1.0)), HELD.awaited))
+BLINDED = Activity(RunPhase.STOPPED_AND_WAITING, NOT_OURS, BLIND)
 WAITING = Activity(RunPhase.WAITING, awaited=Reason(WaitReason.ARMING))
 DOUBTED = Activity(RunPhase.STOPPED, Reason(Doubt.POSITION_WANDERS))
 DONE, BY_USER = (Activity(RunPhase.ENDED, Reason(kind)) for kind in (EndReason.DONE, EndReason.STOPPED_BY_USER))
@@ -98,6 +100,7 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         (DRIVING, {"part": Part.RETURN, "broken_off": LOW}, "driving to gate", "battery low for the autopilot"),
         (WAITING, {}, "waiting for arming", "asked for; the autopilot says if it refuses"),
         (HELD, {}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
+        (BLINDED, {}, "stopped: range data silent for over 1 s", "waiting for good data and a person to set X"),
         (HELD, PILOT, "the pilot drives (MANUAL)", "waiting for a person to set X"),
         (DOUBTED, {}, "stopped: position wanders", ""),
         (DOUBTED, ROLLS, "stopping: position wanders", ""),
