@@ -18,6 +18,8 @@ from companion.viewer.wire import Place, tile_message, tiles_in
 PAST_S = 600.0
 EVERY_S = 1.0
 """One frame a second is kept for those who come later, for so long; of what was before only the track."""
+BACK_S = 1.0
+"""A clock that goes back by more than this is another run's."""
 NEWS_KEPT = 500
 TILES_AT_ONCE = 200
 KEPT_OF_PAST = ("kind", "t", "pose", "speed", "state", "figures", "statuses")
@@ -146,6 +148,9 @@ class LiveBoard:
         self._wake()
 
     def _take_frame(self, frame: Json) -> None:
+        if frame["t"] < self._past_s - BACK_S:  # a page forgets what was before, too
+            self.past.clear()
+            self._news.clear()
         self.frame, self.frame_count = frame, self.frame_count + 1
         news = frame["news"]
         self._news.extend(news)

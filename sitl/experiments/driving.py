@@ -12,10 +12,10 @@ from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 from rich.table import Table
 
 from companion.bench.movingai import ScenarioFileError, read_scenarios, scenario_file, spread
-from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import warm_up
 from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
@@ -32,11 +32,11 @@ from sitl.experiments.experiment import (
     shipped_missions,
     where_measured,
 )
-from sitl.experiments.intervals import mean_interval, ratio_with_interval
-from sitl.experiments.navigation import OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
+from sitl.experiments.intervals import mean_interval, mean_with_interval, ratio_with_interval
+from sitl.experiments.navigation import CURVES, OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
 from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
 from sitl.generators.kinds import GroundKind
-from sitl.lockstep import DriveOutcome, Report
+from sitl.lockstep import Report
 from sitl.map_mission import mission_on_map
 
 NAME = "driving"
@@ -59,6 +59,7 @@ PROBLEMS = 4
 MAP_RESOLUTION_M = 2.0
 """Field size of maps that do not say: wide enough for a rover of 0.35 m."""
 ALL = "all"
+Times = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,14 +82,14 @@ class Series:
         return [one.report for one in self.drives]
 
     @property
-    def times_s(self) -> list[float]:
-        """From the first movement to the last, of each drive."""
-        return [report.driving_time_s for report in self.reports]
+    def times_s(self) -> Times:
+        """From the first movement to the last, of each drive; NaN where a target was missed."""
+        return np.array([one.report.driving_time_s if one.reached else math.nan for one in self.drives])
 
     @property
     def time_s(self) -> float:
-        """Mean driving time."""
-        return float(np.mean(self.times_s))
+        """Mean of those that reached all."""
+        return _mean(self.times_s)
 
     @property
     def steps(self) -> float:
@@ -98,11 +99,7 @@ class Series:
     @property
     def missed(self) -> int:
         """Drives in which a target was missed."""
-        return sum(
-            report.outcome not in (DriveOutcome.REACHED, DriveOutcome.COLLISION)
-            or any(status is not TargetStatus.REACHED for _, status in report.targets)
-            for report in self.reports
-        )
+        return sum(not one.reached for one in self.drives)
 
     @property
     def bound_s(self) -> float:
@@ -155,11 +152,16 @@ class DrivingReport(ExperimentReport):
         return list(dict.fromkeys(series.course for series in self.series))
 
     def _rows(self, course: str) -> list[list[str]]:
-        own = _joined(self.series) if course == ALL else [one for one in self.series if one.course == course]
-        reference = next((one for one in own if one.planner == REFERENCE and not one.known), own[0])
-        known = next(one for one in own if one.known)
-        bound = ["bound", f"{known.bound_s:.1f}", *_over(known.bound_s, reference, known), *[""] * (len(HEAD) - 5)]
-        return [*(_row(one, reference, known) for one in own), bound]
+        rows = {
+            name: [one for one in self.series if one.name == name and course in (ALL, one.course)]
+            for name in dict.fromkeys(series.name for series in self.series)
+        }
+        bounds_s = [one.bound_s for one in rows[KNOWN]]
+        bound_s = sum(bounds_s) / len(bounds_s)
+        reference_s, known_s = together(rows[REFERENCE]), together(rows[KNOWN])
+        quotients = [_quotient(bound_s, other_s) for other_s in (_mean(reference_s), _mean(known_s), bound_s)]
+        bound = ["bound", f"{bound_s:.1f}", *quotients, *[""] * (len(HEAD) - 5)]
+        return [*(_row(own, reference_s, known_s, bound_s) for own in rows.values()), bound]
 
     def _draw(self) -> Figure:
         names = self._courses()
@@ -174,8 +176,9 @@ class DrivingReport(ExperimentReport):
             colour = drawing.GREY if row == KNOWN else colours[i % len(colours)]
             panel.bar(places, [own[name].time_s for name in names], width * 0.9, label=row, color=colour)
             for place, name in zip(places, names, strict=True):
-                low_s, high_s = mean_interval(own[name].times_s)
-                panel.plot([place, place], [low_s, high_s], color="0.2", linewidth=1.0)
+                reached_s = own[name].times_s[~np.isnan(own[name].times_s)]
+                if len(reached_s):
+                    panel.plot([place, place], mean_interval(reached_s), color="0.2", linewidth=1.0)
         bounds_s = [next(one.bound_s for one in self.series if one.course == name and one.known) for name in names]
         middles = np.arange(len(names))
         panel.hlines(bounds_s, middles - 0.42, middles + 0.42, color="0.1", linewidth=1.6, label="bound")
@@ -195,18 +198,18 @@ class DrivingReport(ExperimentReport):
 `{self.options.command(NAME)}`
 
 Shipped missions and random grounds (*made*) in lock-step, with the rover's dynamics and sensor noise, led by points,
-with several planners in the navigator. Each row is made of {runs} drives, with seeds {first} to {first + runs - 1},
-the same for all; each seed is another ground of its kind. *time s*: mean driving time; */ {REFERENCE}*: the same over
-that planner's, pair by pair; in brackets 95 % intervals, by resampling seeds. *{KNOWN}*: the whole map is known from
-the start, as if all had been seen before; */ known*: the time over that one, which is what better exploring could gain
-at all. *bound*: the shortest way of the footprint at cruise speed, any angle, and the stays: nothing can be faster;
-fences do not count. *back*: steps in return mode; *missed*: drives in which a target was not reached; *Ah*: charge from
-the battery; *by curves*: the share of searches that the genetic algorithm answered with a curve of its own, and not a
-graph search.
+with several planners in the navigator. Each row is made of {runs} drives, with seeds {first} to {first + runs - 1}, the
+same for all; each seed is another ground of its kind. *time s*: mean driving time of the drives that reached all
+targets; */ {REFERENCE}*: the same over that planner's, of the seeds with which both did; in brackets 95 % intervals, by
+resampling seeds. *{KNOWN}*: the whole map is known from the start, as if all had been seen before; */ known*: the time
+over that one, which is what better exploring could gain at all. *bound*: about the least time that physics allows, the
+shortest way of the footprint, any angle, at the mission's speeds, and the stays; fences do not count. *back*: steps in
+return mode; *missed*: drives in which a target was not reached; *Ah*: charge from the battery; *by curves*: the share
+of searches that the genetic algorithm answered with a curve of its own, and not a graph search.
 
 {tables}
 
-All together:
+All together, for each seed the mean over the courses:
 
 {markdown_table(HEAD, self._rows(ALL))}
 
@@ -218,38 +221,42 @@ Driving times do not depend on the computer; plan ms (all planning of a drive) w
 """
 
 
-def _row(one: Series, reference: Series, known: Series) -> list[str]:
-    """Figures for people."""
-    reports = one.reports
-    low_s, high_s = mean_interval(one.times_s)
+def together(series: Sequence[Series]) -> Times:
+    """The time of each seed: the mean over the courses; NaN where one was not driven to its end."""
+    times_s: Times = np.mean([one.times_s for one in series], axis=0)
+    return times_s
+
+
+def _row(own: Sequence[Series], reference_s: Times, known_s: Times, bound_s: float) -> list[str]:
+    """Figures of one planner, on one course or on several together, for people."""
+    times_s, reports = together(own), [report for one in own for report in one.reports]
     searches = sum(report.searches for report in reports)
     curves = sum(report.genetic_searches for report in reports)
-    pairs = np.column_stack((one.times_s, reference.times_s))
+    pairs = np.column_stack((times_s, reference_s))
+    pairs = pairs[~np.isnan(pairs).any(axis=1)]
     return [
-        one.name,
-        f"{one.time_s:.1f} ({low_s:.1f} to {high_s:.1f})",
-        "1" if one is reference else ratio_with_interval(pairs),
-        *_over(one.time_s, reference, known)[1:],
+        own[0].name,
+        mean_with_interval(times_s[~np.isnan(times_s)], digits=1),
+        "1" if own[0].name == REFERENCE else ratio_with_interval(pairs),
+        *(_quotient(_mean(times_s), other_s) for other_s in (_mean(known_s), bound_s)),
         f"{np.mean([report.distance_m for report in reports]):.1f}",
         f"{np.mean([report.return_steps for report in reports]):.1f}",
-        f"{one.missed}",
+        f"{sum(one.missed for one in own)}",
         f"{sum(report.collisions for report in reports)}",
         f"{np.mean([report.drawn_ah for report in reports]):.3f}",
-        f"{curves / searches:.2f}" if curves else "-",
+        f"{curves / searches:.2f}" if own[0].planner in CURVES and searches else "-",
         drawing.figures(float(np.median([1e3 * report.planning_time_s for report in reports]))),
     ]
 
 
-def _over(time_s: float, reference: Series, known: Series) -> list[str]:
-    return [f"{time_s / other_s:.3f}" for other_s in (reference.time_s, known.time_s, known.bound_s)]
+def _mean(values: Times) -> float:
+    """Of those that are known; NaN for none."""
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan
 
 
-def _joined(series: Sequence[Series]) -> list[Series]:
-    """One series a row, of all courses."""
-    drives: dict[tuple[str, bool], list[CourseDrive]] = {}
-    for one in series:
-        drives.setdefault((one.planner, one.known), []).extend(one.drives)
-    return [Series(planner, ALL, tuple(own), known) for (planner, known), own in drives.items()]
+def _quotient(time_s: float, other_s: float) -> str:
+    return "-" if math.isnan(time_s / other_s) else f"{time_s / other_s:.3f}"
 
 
 def shortfalls(series: tuple[Series, ...]) -> str:
@@ -281,7 +288,7 @@ def run(options: Options, advance: Advance) -> DrivingReport:
     """Make all drives. The result (but for planning times) does not depend on ``jobs``."""
     courses: dict[str, Mission | str] = {**_shipped(options), **{f"made {kind}": kind.value for kind in KINDS}}
     courses |= _given(options)
-    planners = planners_of(options, DRIVEN)
+    planners = tuple(dict.fromkeys((*planners_of(options, DRIVEN), REFERENCE)))
     for planner in planners:
         warm_up(settings_with(planner))
     keys = [(name, planner, False) for name in courses for planner in planners]

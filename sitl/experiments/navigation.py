@@ -32,7 +32,7 @@ from sitl.experiments.experiment import (
     where_measured,
 )
 from sitl.experiments.field_level import STEP_LIMIT, FieldRun, Outcome, measured_runs
-from sitl.experiments.intervals import mean_interval, ratio_with_interval
+from sitl.experiments.intervals import mean_with_interval, ratio_with_interval
 from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
 from sitl.generators.kinds import GroundKind
 from sitl.generators.made_ground import made
@@ -46,6 +46,8 @@ KINDS = (GroundKind.CLUTTER, GroundKind.ROOMS, GroundKind.YARD, GroundKind.MAZE,
 MADE_FIELD_M = 0.5
 """Fields of made grounds; the rover, of ``MADE_RADIUS_M``, is a point on them, as obstacles are grown by as much."""
 MADE_RADIUS_M = 0.35
+CURVES = ("hybrid", "bspline-ga")
+"""Planners that ask a genetic algorithm for curves."""
 OURS, STEPS_REFERENCE, STEPS_FACTOR = "hybrid", "dstar-lite", 1.05
 """Aimed at: what drives by default takes no more steps than so many times this one's."""
 SHOWN = {"hybrid": drawing.BLUE, "bspline-ga": drawing.ORANGE, "dstar-lite": drawing.GREEN, "theta-star": drawing.RED}
@@ -99,11 +101,11 @@ class Series:
             self.planner,
             f"{self.reached}/{len(self.runs)}",
             f"{np.median(self.over):.3f}" if self.over else "-",
-            _mean(self.over),
+            mean_with_interval(self._of_grounds(self.over), digits=3),
             self._ratio(reference),
             f"{np.mean([run.return_steps for run in self.runs]):.1f}",
             f"{np.median([run.searches for run in self.runs]):.0f}",
-            f"{curves / searches:.2f}" if curves else "-",
+            f"{curves / searches:.2f}" if self.planner in CURVES and searches else "-",
             drawing.figures(float(np.median([1e3 * run.planning_s for run in self.runs]))),
             drawing.figures(float(np.percentile(steps_ms, 99))),
         ]
@@ -113,16 +115,22 @@ class Series:
         if reference is None or reference is self:
             return "-" if reference is None else "1"
         others = {id(ground): one.steps for ground, one in reference.arrived}
-        pairs = [(one.steps, others[id(ground)]) for ground, one in self.arrived if id(ground) in others]
-        return ratio_with_interval(np.array(pairs, float)) if pairs else "-"
+        steps = self._of_grounds([one.steps for _, one in self.arrived])
+        if len(set(map(id, self.grounds))) == 1:
+            other = next(iter(others.values()), None)
+            return "-" if other is None else ratio_with_interval(np.array([(each, other) for each in steps], float))
+        grounds = dict.fromkeys(id(ground) for ground, _ in self.arrived)
+        pairs = [(own, others[ground]) for own, ground in zip(steps, grounds, strict=True) if ground in others]
+        return ratio_with_interval(np.array(pairs, float).reshape(-1, 2))
 
-
-def _mean(values: Sequence[float]) -> str:
-    """With its interval, where there is more than one."""
-    if len(values) < 2:
-        return f"{values[0]:.3f}" if values else "-"
-    low, high = mean_interval(values)
-    return f"{np.mean(values):.3f} ({low:.3f} to {high:.3f})"
+    def _of_grounds(self, values: Sequence[float]) -> list[float]:
+        """Of several grounds the mean on each: it is they that were drawn. ``values``: of the runs that arrived."""
+        if len(set(map(id, self.grounds))) == 1:
+            return list(values)
+        of_ground: dict[int, list[float]] = {}
+        for (ground, _), value in zip(self.arrived, values, strict=True):
+            of_ground.setdefault(id(ground), []).append(value)
+        return [float(np.mean(own)) for own in of_ground.values()]
 
 
 HEAD = (
@@ -223,10 +231,10 @@ The four maps of the section on unknown maps, and *made* grounds: random worlds 
 {MADE_FIELD_M:g} m, another one for each seed, the same for all planners. They are driven field by field as there (at
 most {STEP_LIMIT} steps), each time with another planner in the navigator. *steps/best* is the median (then the mean) of
 the steps over those of a shortest path for somebody who knows the map; */ {STEPS_REFERENCE}* the mean steps over that
-planner's on the same grounds; in brackets 95 % intervals, by resampling runs; *back* the mean number of steps in return
-mode; *by curves* the share of searches that the genetic algorithm answered with a curve of its own, and not a graph
-search; *plan* the median of all planning of one run together, *p99* of single calls of the navigator's step, searches
-included, in milliseconds. {self._runs_explained()}
+planner's on the same grounds; in brackets 95 % intervals, by resampling runs, or grounds where there are several;
+*back* the mean number of steps in return mode; *by curves* the share of searches that the genetic algorithm answered
+with a curve of its own, and not a graph search; *plan* the median of all planning of one run together, *p99* of single
+calls of the navigator's step, searches included, in milliseconds. {self._runs_explained()}
 
 {tables}
 

@@ -22,7 +22,7 @@ from companion.settings.settings_file import parse_settings
 from sitl.experiments.controllers import SENSORS, mission_on
 from sitl.experiments.dead_companion import STOOD_M_S
 from sitl.experiments.experiment import GUARD, POINTS, Advance, ExperimentReport, Options, each, shipped_missions
-from sitl.experiments.intervals import mean_interval, ratio_with_interval
+from sitl.experiments.intervals import mean_with_interval, ratio_with_interval
 from sitl.experiments.off_model import parameters_for
 from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
 from sitl.generators.kinds import GroundKind
@@ -144,21 +144,20 @@ moves, and the rover stops or moves aside before it; *{Way.ONE_SPEED}*: `vertex+
 be, at cruise speed; *{Way.SPEEDS}*: with a speed for each piece of the path; *{Way.MOTIONS}*: `motion-ga` plans motions
 among them, with the guard on the autopilot. All of them make way, too. *touched*: contacts while the rover moved; *run
 into*: it stood, and something came along (nothing here gives way to a rover); *missed*: targets not reached; *mean s*:
-driving time, and */ {Way.MAKE_WAY}* that over the first way's on the same seeds; in brackets 95 % intervals by
-resampling seeds.
+driving time where none was, and */ {Way.MAKE_WAY}* that over the first way's, of the seeds with which both missed none;
+in brackets 95 % intervals by resampling seeds.
 
 {tables}
 """
 
 
 def _row(own: Sequence[TrafficDrive], reference: Sequence[TrafficDrive]) -> list[str]:
-    times_s = [one.seconds for one in own]
-    low_s, high_s = mean_interval(times_s)
     counts = [sum(getattr(one, name) for one in own) for name in ("touched", "run_into", "refused", "missed")]
-    pairs = np.array([(one.seconds, other.seconds) for one, other in zip(own, reference, strict=True)])
+    arrived = [(one, other) for one, other in zip(own, reference, strict=True) if not one.missed + other.missed]
+    pairs = np.array([(one.seconds, other.seconds) for one, other in arrived], float).reshape(-1, 2)
+    times_s = [one.seconds for one in own if not one.missed]
     ratio = "1" if own is reference else ratio_with_interval(pairs)
-    spread = f"{np.mean(times_s):.1f} ({low_s:.1f} to {high_s:.1f})"
-    return [own[0].way, f"{len(own)}", *map(str, counts), spread, ratio]
+    return [own[0].way, f"{len(own)}", *map(str, counts), mean_with_interval(times_s, digits=1), ratio]
 
 
 def run(options: Options, advance: Advance) -> TrafficReport:

@@ -72,10 +72,10 @@ export class Model {
     const last = frames.at(-1);
     if (last && last.t < this.lastT - BACK_S) this.forget();
     // Of what was before these frames only the track is told, as fewer places.
-    for (const [t, ...seen] of track) {
+    for (const [t, north, east, speed, starts] of track) {
       if (!(t > this.lastT)) continue;
-      if (seen.length) this.track.add(t, ...seen);
-      else this.track.interrupt();
+      if (starts) this.track.interrupt();
+      this.track.add(t, north, east, speed);
       this.lastT = t;
     }
     for (const frame of frames) this.follow(frame);

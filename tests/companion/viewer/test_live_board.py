@@ -100,23 +100,34 @@ def test_another_map_begins_with_its_scene() -> None:
 def test_who_comes_after_hours_is_told_the_whole_track() -> None:
     live = board()
     for second in range(20_000):
-        lost = second in range(5000, 5020)
-        live.take({**frame(float(second)), **({"pose": None} if lost else {})})
+        lost = {"pose": None} if second in (5001, 9502) else {}
+        jumped = {"pose": [second + 100.0, 0.0, 0.0]} if second >= 12_345 else {}
+        live.take({**frame(float(second)), **lost, **jumped})
     texts, _ = heard(live.join(False, lambda: None))
     track, frames = texts[1]["track"], texts[1]["frames"]
-    assert len(track) <= MOST + 1 and track[0] == [0.0, 0.0, 0.0, 1.0]
+    assert len(track) <= MOST + 1 and track[0] == [0.0, 0.0, 0.0, 1.0, 1]
     times_s = [one[0] for one in track]
-    assert times_s == sorted(times_s) and max(later - one for one, later in pairwise(times_s)) <= 4.0
+    assert times_s == sorted(times_s) and max(later - one for one, later in pairwise(times_s)) <= 5.0
     assert times_s[-1] + 1.0 == frames[0]["t"], "they join on"
-    assert all(one[1] == one[0] for one in track if len(one) == 4)
-    assert {one[0] for one in track if len(one) == 1} <= set(range(5000, 5020)) and any(len(one) == 1 for one in track)
+    assert all(one[1] == one[0] + (100.0 if one[0] >= 12_345 else 0.0) for one in track)
+    begun_s = [one[0] for one in track if one[4]]
+    assert len(begun_s) == 4, "where the place was not known for a second, and where it jumped, a new line begins"
+    assert all(0.0 <= begun - break_s <= 5.0 for begun, break_s in zip(begun_s, (0, 5002, 9503, 12_345), strict=True))
 
 
-def test_a_clock_that_goes_back_begins_another_track() -> None:
+def test_after_a_clock_that_went_back_only_what_has_been_since_is_told() -> None:
     live = board()
     for second in (*range(1000), *range(700)):
-        live.take(frame(float(second)))
-    assert live.earlier.places[0][0] == 0.0 and live.earlier.places[-1][0] == 99.0
+        live.take(frame(float(second), f"at {second}"))
+    texts, _ = heard(live.join(False, lambda: None))
+    past = texts[1]
+    assert past["track"][0][0] == 0.0 and past["track"][-1][0] == 99.0
+    assert [one["t"] for one in past["frames"]] == [float(second) for second in range(100, 700)]
+    live = board()
+    for second in (*range(300), *range(60)):
+        live.take(frame(float(second), f"at {second}"))
+    past = heard(live.join(False, lambda: None))[0][1]
+    assert (past["track"], len(past["frames"]), len(past["news"])) == ([], 60, 60)
 
 
 def test_nothing_grows_without_bound() -> None:

@@ -78,7 +78,8 @@ def test_every_shortfall_of_driving_is_said() -> None:
     text = shortfalls((*good, driven("dstar-lite", "a", 8.0, 100)))
     assert text.count("reached") == 3 and "not reached" not in text
     bad = (
-        driven("hybrid", "b", 11.0, 120, DriveOutcome.TIME_LIMIT),
+        driven("hybrid", "b", 11.0, 120),
+        driven("hybrid", "c", 11.0, 120, DriveOutcome.TIME_LIMIT),
         driven("theta-star", "b", 10.0, 90),
         driven("dstar-lite", "b", 8.0, 100),
     )
