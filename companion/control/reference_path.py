@@ -22,6 +22,9 @@ Points = NDArray[np.float64]
 """Shape (n, 2): columns north_m and east_m in the local frame."""
 
 STEP_M = 0.25
+OFF_M, NEARER_M, REJOIN_M = 1.0, 0.5, 20.0
+"""A rover farther than the first from where it has come to on its path looks for a place that is nearer, by the second,
+on so much of what is left."""
 ASIDE_M, ASIDE_STEP_M = 0.3, 0.025
 """In narrow places a path is moved aside by so much at most, in such steps."""
 
@@ -137,6 +140,27 @@ def advanced(path: ReferencePath, pose: Pose, window_m: float = 4.0) -> Referenc
     stop = min(len(path.points), path.progress + int(window_m / STEP_M) + 1)
     ahead = path.points[path.progress : stop]
     nearest = int(((ahead[:, 0] - pose.north_m) ** 2 + (ahead[:, 1] - pose.east_m) ** 2).argmin())
+    return ReferencePath(path.points, path.progress + nearest, path.speeds_m_s)
+
+
+def rejoined(path: ReferencePath, here: NedPoint, evidence: EvidenceMap, half_width_m: float) -> ReferencePath:
+    """The path with its progress moved on past a bend that the rover has left out; the same where it has left out none.
+
+    A rover that plans motions cuts a bend, and one that makes way may come to the path's other end. The nearest place
+    of the next metres counts if it is nearer than where the rover should be, and lies straight over seen ground.
+    """
+    off_m = here.distance_m(path.point(path.progress))
+    ahead = path.points[path.progress : path.progress + round(REJOIN_M / STEP_M)]
+    if off_m <= OFF_M:
+        return path
+    places_m = np.hypot(ahead[:, 0] - here.north_m, ahead[:, 1] - here.east_m)
+    nearest = int(places_m.argmin())
+    near_m = float(places_m[nearest])
+    if near_m > off_m - NEARER_M:
+        return path
+    line = look_along(evidence, here, path.point(path.progress + nearest), half_width_m)
+    if min(line.clear_m, line.seen_m) < near_m - 0.5 * evidence.evidence_m:
+        return path
     return ReferencePath(path.points, path.progress + nearest, path.speeds_m_s)
 
 

@@ -16,7 +16,7 @@ from companion.control.local_view import LocalView
 from companion.control.motion_controller import MotionController
 from companion.control.motion_planners import motion_planner
 from companion.control.point_controller import PointController
-from companion.control.reference_path import ReferencePath, advanced, narrowest_ahead, reference_path
+from companion.control.reference_path import ReferencePath, advanced, narrowest_ahead, reference_path, rejoined
 from companion.control.stuck_recovery import StuckRecovery
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
@@ -221,7 +221,8 @@ class GoalDriver:
             return backing
         if self.path is None:
             return STANDSTILL
-        self.path = advanced(self.path, view.pose)
+        on_path = advanced(self.path, view.pose)
+        self.path = rejoined(on_path, view.pose.point, view.evidence, view.rover.radius_m)
         command = self._controller.follow(self.path, self._at_planned_speed(self.path, view))
         if self._recovery.is_stuck(view, command):
             self._get_unstuck(view)

@@ -13,6 +13,7 @@ from companion.control.reference_path import (
     path_along_curve,
     path_along_fields,
     path_is_clear,
+    rejoined,
 )
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, empty_grid
@@ -69,6 +70,35 @@ def test_progress_moves_forward_and_only_within_its_window():
     assert ahead.left_m == pytest.approx(5.5, abs=STEP_M)
     assert ahead.point_ahead(1.0).north_m == pytest.approx(14.0, abs=STEP_M)
     assert ahead.point_ahead(99.0) == END
+
+
+def hooked() -> ReferencePath:
+    """From (12, 10.5) three metres south, round to the east, and back north past where it began."""
+    south = [(12.0 - 0.25 * i, 10.5) for i in range(13)]
+    east = [(9.0, 10.5 + 0.25 * i) for i in range(1, 7)]
+    north = [(9.0 + 0.25 * i, 12.0) for i in range(1, 37)]
+    return ReferencePath(np.array([*south, *east, *north]))
+
+
+@pytest.mark.parametrize("wall", [False, True])
+def test_a_bend_that_was_cut_is_left_out_but_not_through_a_wall(wall: bool) -> None:
+    """In clutter the rover turned to and fro for 50 s: it had cut a hook, and the path began where it was nearest."""
+    ground, path = looked(), hooked()
+    ground.map.log_odds[:] = -1.0
+    if wall:
+        column = int(11.5 * ground.map.subdivisions)
+        ground.map.log_odds[:, column : column + 2] = 3.0
+    for north_m in (13.0, 14.0, 15.0):
+        here = Pose(north_m, 11.0 if wall else 11.9, 0.0, 0.0)
+        path = rejoined(advanced(path, here), here.point, ground.map, 0.35)
+    place = path.point(path.progress)
+    assert (place == NedPoint(12.0, 10.5)) if wall else place.distance_m(NedPoint(15.0, 12.0)) < 0.2
+
+
+def test_near_its_path_a_rover_leaves_nothing_out() -> None:
+    ground, path = looked(), hooked()
+    here = NedPoint(11.4, 11.0)
+    assert rejoined(path, here, ground.map, 0.35) is path
 
 
 def test_a_path_is_clear_until_something_stands_in_it():
