@@ -24,12 +24,12 @@ from sitl.scenario import Scenario
 FINE_M = 0.25
 """Fields are no larger than this for it."""
 UNKNOWN_S = 0.0
-"""Where there is no bound: a target without a way, a patrol, open ground without a world."""
+"""Where there is no bound: a target without a way, a patrol."""
 Places = list[tuple[float, float]]
 
 
 def time_bound_s(mission: Mission, scenario: Scenario, executor: MissionExecutor) -> float:
-    """The shortest way at any angle (Theta*) from target to target at cruise speed, and the stays on the way.
+    """The shortest way at any angle (Theta*) from target to target at the mission's speeds, and the stays on the way.
 
     For a point in the middle of the rover that keeps half its width, among what stands and with all doors open; corners
     cost nothing. ``UNKNOWN_S`` where there is none.
@@ -39,14 +39,19 @@ def time_bound_s(mission: Mission, scenario: Scenario, executor: MissionExecutor
         return UNKNOWN_S
     frame, start = LocalFrame(executor.layout.origin), scenario.start
     places = [start.place_of(frame.to_geo(target.point)) for target in progress.targets]
-    metres = way_m(scenario, [(start.north_m, start.east_m), *places])
+    legs_m = ways_m(scenario, [(start.north_m, start.east_m), *places])
+    if legs_m is None:
+        return UNKNOWN_S
+    speeds_m_s = [target.speed_m_s or mission.rover.cruise_speed_m_s for target in progress.targets]
     stays_s = sum(target.hold_s for target in progress.targets[:-1])
-    return UNKNOWN_S if metres is None else metres / mission.rover.cruise_speed_m_s + stays_s
+    return math.fsum(leg_m / speed_m_s for leg_m, speed_m_s in zip(legs_m, speeds_m_s, strict=True)) + stays_s
 
 
-def way_m(scenario: Scenario, places: Places) -> float | None:
-    """Length of the shortest way through places (north and east, world frame); None if there is none."""
+def ways_m(scenario: Scenario, places: Places) -> list[float] | None:
+    """Lengths of the shortest ways from place to place (north and east, world frame); None if one has none."""
     world = scenario.world
+    if not world.obstacles.any():
+        return [math.dist(*ends) for ends in pairwise(places)]
     pieces = max(1, math.ceil(world.resolution_m / FINE_M - 1e-9))
     side_m = world.resolution_m / pieces
     solid = world.obstacles.repeat(pieces, axis=0).repeat(pieces, axis=1)
@@ -58,7 +63,8 @@ def way_m(scenario: Scenario, places: Places) -> float | None:
     corner = (world.south_m, world.west_m)
     cells = [_cell(place, corner, side_m) for place in places]
     legs_m = [_leg_m(weights, one, two, side_m) for one, two in pairwise(cells)]
-    return None if None in legs_m else math.fsum(leg for leg in legs_m if leg is not None)
+    known_m = [leg_m for leg_m in legs_m if leg_m is not None]
+    return known_m if len(known_m) == len(legs_m) else None
 
 
 def _cell(place: tuple[float, float], corner: tuple[float, float], side_m: float) -> Cell:

@@ -156,11 +156,10 @@ class DrivingReport(ExperimentReport):
             name: [one for one in self.series if one.name == name and course in (ALL, one.course)]
             for name in dict.fromkeys(series.name for series in self.series)
         }
-        bounds_s = [one.bound_s for one in rows[KNOWN]]
-        bound_s = sum(bounds_s) / len(bounds_s)
+        bound_s = sum(one.bound_s for one in rows[KNOWN]) / len(rows[KNOWN])
         reference_s, known_s = together(rows[REFERENCE]), together(rows[KNOWN])
         quotients = [_quotient(bound_s, other_s) for other_s in (_mean(reference_s), _mean(known_s), bound_s)]
-        bound = ["bound", f"{bound_s:.1f}", *quotients, *[""] * (len(HEAD) - 5)]
+        bound = ["bound", "-" if math.isnan(bound_s) else f"{bound_s:.1f}", *quotients, *[""] * (len(HEAD) - 5)]
         return [*(_row(own, reference_s, known_s, bound_s) for own in rows.values()), bound]
 
     def _draw(self) -> Figure:

@@ -16,8 +16,8 @@ from companion.executive.mission_progress import TargetStatus
 from companion.mapping.evidence_map import EvidenceMap, restore
 from companion.mission.mission import Mission
 from companion.recording.recorder import NullRecorder
+from sitl.campaign.time_bound import UNKNOWN_S, time_bound_s
 from sitl.experiments.controllers import SENSORS, mission_on
-from sitl.experiments.driving_bound import bound_s
 from sitl.experiments.experiment import POINTS
 from sitl.experiments.navigation import settings_with
 from sitl.experiments.off_model import parameters_for
@@ -36,7 +36,7 @@ ON_EDGE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class CourseDrive:
-    """One drive. ``bound_s``: see ``bound_s``; None: not asked for."""
+    """One drive. ``bound_s``: see ``time_bound_s``; None: not asked for, or there is none."""
 
     report: Report
     bound_s: float | None = None
@@ -61,7 +61,9 @@ def drive(course: Mission | str, planner: str, seed: int, known: bool = False) -
     told = _ToldMap(run) if known else None
     report = run.run() if told is None else run.run(told.observe, TELL_S)
     report.track.clear()
-    return CourseDrive(report, bound_s(run) if known else None)
+    executor = run.companion.executor
+    bound_s = time_bound_s(mission, scenario, executor) if known and executor is not None else UNKNOWN_S
+    return CourseDrive(report, None if bound_s == UNKNOWN_S else bound_s)
 
 
 def _on_made_ground(kind: str, seed: int) -> tuple[Mission, Scenario]:

@@ -10,13 +10,18 @@ import pytest
 
 from sitl.campaign.drive_run import mission_of
 from sitl.campaign.run_spec import RunSpec
-from sitl.campaign.time_bound import way_m
+from sitl.campaign.time_bound import ways_m
 from sitl.generators.kinds import GroundKind
 from sitl.generators.made_ground import made
 from sitl.plant.outline import Outline
 from sitl.scenario import SOMEWHERE, Scenario, scenario_from_mission
 from sitl.world.truth import SimStart
 from sitl.world.world import World
+
+
+def way_m(where: Scenario, places: list[tuple[float, float]]) -> float | None:
+    legs_m = ways_m(where, places)
+    return None if legs_m is None else math.fsum(legs_m)
 
 
 def scenario(solid: np.ndarray, side_m: float) -> Scenario:
@@ -39,6 +44,15 @@ def test_round_the_end_of_a_wall_and_back() -> None:
     assert back == pytest.approx(2.0 * there, abs=0.5)
     solid[:, 10] = True
     assert way_m(scenario(solid, 1.0), [(5.0, 5.0), (5.0, 16.0)]) is None
+
+
+@pytest.mark.parametrize("first", [100, 101, 102, 103])
+def test_a_thin_wall_is_no_gap_wherever_it_stands(first: int) -> None:
+    solid = np.zeros((200, 200), np.bool_)
+    solid[:140, first : first + 2] = True  # 0.2 m thick, 14 m long
+    around_m = math.hypot(0.1 * first - 5.0, 9.0) + math.hypot(15.8 - 0.1 * first, 9.0)
+    metres = way_m(scenario(solid, 0.1), [(5.0, 5.0), (5.0, 16.0)])
+    assert metres is not None and around_m - 0.5 < metres < around_m + 1.5
 
 
 def test_generated_ground_always_has_one() -> None:

@@ -1,9 +1,8 @@
-"""The known map, as it is told, and the shortest way of the footprint."""
+"""The known map, as it is told, and what counts together."""
 
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from companion.core.grid import empty_grid
 from companion.mapping.evidence_map import new_map, occupied_fields
 from companion.settings import Settings
 from sitl.experiments.driving import Series, together
-from sitl.experiments.driving_bound import FIELD_M, shortest_ways_m
 from sitl.experiments.driving_courses import CourseDrive, drive, tell
 from sitl.generators.made_ground import made
 from sitl.lockstep import DriveOutcome, Report
@@ -22,48 +20,6 @@ from sitl.world.truth import SimStart
 from sitl.world.world import World
 
 RADIUS_M = 0.35
-WALL_EAST_M, GAP_M = 10.03, 14.0
-
-
-def walled(resolution_m: float, thick_m: float, aside_m: float = 0.0) -> World:
-    """20 m x 20 m with a wall across, open north of ``GAP_M``."""
-    fields = np.zeros((round(20.0 / resolution_m),) * 2, np.bool_)
-    first = round((WALL_EAST_M + aside_m) / resolution_m)
-    fields[: round(GAP_M / resolution_m), first : first + max(1, round(thick_m / resolution_m))] = True
-    return World(fields, resolution_m)
-
-
-@pytest.mark.parametrize("aside_m", [0.0, 0.05, 0.1, 0.15, 0.2])
-@pytest.mark.parametrize(("resolution_m", "thick_m"), [(0.1, 0.2), (0.1, 0.1), (0.5, 1.0), (1.0, 1.0)])
-def test_past_a_wall_the_way_leads_round_its_end(resolution_m: float, thick_m: float, aside_m: float) -> None:
-    world, start, target = walled(resolution_m, thick_m, aside_m), (5.0, 5.0), (5.0, 16.0)
-    columns = np.flatnonzero(world.obstacles[0])
-    corners = [(GAP_M, columns[0] * resolution_m), (GAP_M, (columns[-1] + 1) * resolution_m)]
-    around = [NedPoint(*place) for place in (start, *corners, target)]
-    taut_m = sum(one.distance_m(other) for one, other in pairwise(around))
-    # A disc's middle passes round both corners on arcs: the wall's end as it is, and at each side a little more.
-    turns_rad = [
-        abs(one.bearing_rad(two) - two.bearing_rad(three))
-        for one, two, three in zip(around, around[1:], around[2:], strict=False)
-    ]
-    exact_m = taut_m + sum(2.0 * RADIUS_M * math.tan(turn_rad / 4.0) for turn_rad in turns_rad)
-    (way_m,) = shortest_ways_m(world, [start, target], RADIUS_M)
-    assert taut_m - FIELD_M <= way_m <= exact_m + 2.0 * FIELD_M
-
-
-@pytest.mark.parametrize("target", [(15.0, 5.0), (-7.0, 2.0), (60.0, 80.0)])
-def test_where_nothing_stands_the_way_is_straight_beyond_the_world_as_well(target: tuple[float, float]) -> None:
-    ways = shortest_ways_m(World.open(), [(5.0, 5.0), target, (5.0, 5.0)], RADIUS_M)
-    assert ways == pytest.approx([math.dist((5.0, 5.0), target)] * 2, abs=FIELD_M)
-
-
-def test_behind_walls_there_is_no_way() -> None:
-    fields = np.ones((60, 60), np.bool_)
-    fields[20:40, 20:40] = False
-    fields[20:40, 30] = True
-    world = World(fields, 0.1)
-    (near_m, none_m) = shortest_ways_m(world, [(2.5, 2.5), (3.5, 2.5), (3.5, 3.5)], 0.2)
-    assert near_m == pytest.approx(1.0, abs=0.15) and math.isnan(none_m)
 
 
 @pytest.mark.parametrize("seed", range(3))
