@@ -12,6 +12,7 @@ from typing import cast
 
 from companion.cli import kernel_cache
 from companion.core.interrupts import is_interrupt
+from companion.core.own_parts import OwnPartError
 
 EXIT_USAGE, EXIT_STOPPED = 2, 130
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -93,6 +94,9 @@ def _run(name: str, commands: Callable[..., object]) -> int:
     except usage_error as error:
         where = error.ctx.command_path if error.ctx is not None else name
         print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)
+        return EXIT_USAGE
+    except OwnPartError as error:
+        print(error, file=sys.stderr)
         return EXIT_USAGE
     except SystemError as error:  # an interrupt inside a compiled loop
         if is_interrupt(error):

@@ -9,10 +9,14 @@ from __future__ import annotations
 
 import importlib
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
+
+from companion.core.interrupts import is_interrupt
 
 
 class OwnKind(StrEnum):
@@ -74,6 +78,17 @@ def made_by(kind: OwnKind, name: str, needs: tuple[str, ...], *given: object) ->
     if missing:
         raise OwnPartError(f"{kind} {name!r:.80} has no {missing[0]}; docs/planners.md shows one")
     return made
+
+
+@contextmanager
+def blamed(kind: OwnKind, name: str) -> Iterator[None]:
+    """A context in which this part works: if it is one's own, what goes wrong is its own fault. Raises OwnPartError."""
+    try:
+        yield
+    except Exception as error:
+        if is_interrupt(error) or not looks_own(kind, name):
+            raise
+        raise OwnPartError(f"{kind} {name!r:.80} fails: {_reason(error)}") from error
 
 
 def source_of(kind: OwnKind, name: str) -> Path | None:

@@ -24,6 +24,7 @@ from companion.control.setpoint_check import velocity_stops_in_time
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
+from companion.core.own_parts import OwnKind, blamed
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.mapping.evidence_map import integrate, new_map, penalise
@@ -79,7 +80,8 @@ def _plan_motions(settings: Settings) -> None:
     for tick in range(3):
         view = LocalView(Pose(3.0, 8.0, 0.0, 0.2 * tick), 1.0, evidence, rover, settings)
         velocity_stops_in_time(GuidedVelocity(0.2, 0.1), view, Bounds())
-        controller.follow(path, view)
+        with blamed(OwnKind.CONTROLLER, settings.guidance.controller):
+            controller.follow(path, view)
         evidence.log_odds[40:44] = 3.0
 
 

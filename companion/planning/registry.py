@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell
-from companion.core.own_parts import OwnKind, OwnPartError, looks_own, made_by, registered
+from companion.core.own_parts import OwnKind, OwnPartError, blamed, looks_own, made_by, registered
 from companion.planning.bspline_ga.planner import BsplineGa
 from companion.planning.graph_search.astar import Astar
 from companion.planning.graph_search.dijkstra import Dijkstra
@@ -78,7 +78,8 @@ def warm_up(names: Iterable[str] = tuple(PLANNERS), settings: PlannerSettings | 
     for name in names:
         planner = make_planner(name, settings or PlannerSettings())
         for problem in (_easy(), _winding()):
-            path = planner.plan(problem, Budget(), rng).path
+            with blamed(OwnKind.PLANNER, name):
+                path = planner.plan(problem, Budget(), rng).path
             if path is not None:
                 cells_cost(problem.weights, path.cell_array)  # the navigator calls them for the rest of a path
                 first_fault(problem.weights, path.cell_array, False)

@@ -95,8 +95,8 @@ def load_campaign(path: Path) -> CampaignTable:
         raise CampaignError(f"{path}: {count} runs are more than {MOST_RUNS}; make the lists shorter")
     for world in table.worlds:
         _check_world(path, folder, world)
-    for plan in table.faults:
-        _check_faults(path, folder, plan)
+    for number, plan in enumerate(table.faults, 1):
+        _check_faults(path, folder, number, plan)
     for number, sensors in enumerate(table.sensors, 1):
         try:
             SensorSpec.of(sensors).check(folder)
@@ -167,10 +167,10 @@ def _check_world(path: Path, folder: Path, world: str) -> None:
         raise CampaignError(f"{path}: worlds: {world!r:.80} is no kind of ground ({kinds}) and no mission file")
 
 
-def _check_faults(path: Path, folder: Path, plan: str) -> None:
+def _check_faults(path: Path, folder: Path, number: int, plan: str) -> None:
     """It must be a plan that can be used. Raises CampaignError."""
     if plan != NOTHING:
         try:
             faults_of(plan, folder)
         except FaultFileError as error:
-            raise CampaignError(f"{path}: faults: {error}") from error
+            raise CampaignError(f"{path}: faults {number}: {str(error).removeprefix('faults: ')}") from error

@@ -19,12 +19,12 @@ from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
-from sitl.campaign.time_bound import time_bound_s
 from sitl.campaign.wire_watch import WireWatch
 from sitl.campaign.worded import NOTHING, OWN, GroundSpec, SensorSpec, faults_of
 from sitl.experiments.dead_companion import STOOD_M_S
 from sitl.experiments.experiment import GUARD
 from sitl.experiments.off_model import off_model
+from sitl.experiments.time_bound import time_bound_s
 from sitl.generators.made_ground import MadeGround, NoWayError, made
 from sitl.lockstep import Drive, TrackPoint
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from companion.storage.files import write_whole
 from sitl.campaign.campaign_file import CampaignTable, run_count
 from sitl.campaign.pictures import MOST_PANELS, heat_maps, times
 from sitl.campaign.policies import Policy, broken
@@ -36,7 +37,7 @@ code { font-size: .85em; background: var(--soft); padding: .1rem .3rem; user-sel
 
 def write_report(file: Path, campaign: CampaignTable, runs: Runs, source: Path) -> None:
     """Write it. ``source``: the campaign's file, for the commands that drive a run again. Raises OSError."""
-    file.write_text(page(campaign, runs, source), encoding="utf-8")
+    write_whole(file, page(campaign, runs, source).encode())
 
 
 def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, writable, written
+from companion.core.interrupts import is_interrupt
 from companion.mapping.map_files import MapError
 from companion.mission.mission import MissionError
 from companion.recording.record_format import RecordError
@@ -22,7 +23,7 @@ from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
-from sitl.cli.runs import FILE, check_all, progress, warm_up_all
+from sitl.cli.runs import FILE, check_all, number_of, progress, warm_up_all
 from sitl.cli.search import search_campaign
 from sitl.generators.made_ground import NoWayError
 from sitl.scenario import ScenarioError
@@ -30,6 +31,7 @@ from sitl.search.goals import Goal
 
 BAD_INPUT = (CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError, NoWayError)
 EXIT_FAILED = 3
+BUDGET = 1000
 
 
 def campaign(
@@ -51,8 +53,9 @@ def campaign(
         Goal | None, typer.Option(help="Look for runs that do this, instead of driving the lists (needs cma).")
     ] = None,
     budget: Annotated[
-        int, typer.Option(min=1, help="With --search: so many runs, and some more to make finds small.")
-    ] = 1000,
+        int | None,
+        typer.Option(min=1, help="With --search: so many runs, and some more to make finds small; default: 1000."),
+    ] = None,
     parquet: Annotated[
         bool, typer.Option("--parquet", help=f"Write {PARQUET}, too (needs the extra parquet).")
     ] = False,
@@ -62,10 +65,12 @@ def campaign(
     Exit code 2: bad input; 3: a run ended with an error of the programs; 130: stopped, what is done is kept.
     """
     try:
+        if budget is not None and search is None:
+            raise CampaignError("--budget goes with --search")
         if replay is not None or record is not None:
             _drive_again(file, replay, record)
         elif search is not None:
-            search_campaign(file, search, budget, out, jobs)
+            search_campaign(file, search, budget or BUDGET, out, jobs)
         else:
             drive_campaign(file, out, jobs, cluster, parquet=parquet)
     except BAD_INPUT as error:
@@ -93,7 +98,8 @@ def drive_campaign(
     put_out(console, table, runs, file, place, parquet=parquet)
     errors = sum(result.outcome == ERROR for _, result in runs)
     if errors:
-        typer.echo(f"{table.name}: {errors} runs ended with an error; {place / REPORT} lists them", err=True)
+        ended = f"{number_of(errors, 'run')} ended with an error"
+        typer.echo(f"{table.name}: {ended}; {place / REPORT} says which", err=True)
         raise typer.Exit(EXIT_FAILED)
     return runs
 
@@ -101,8 +107,8 @@ def drive_campaign(
 def _say_what_there_is(store: RunStore, specs: list[RunSpec]) -> None:
     done = len(store.of(specs))
     parts = [f"{done} of {len(specs)} runs are there"] if done else []
-    parts += [f"{store.torn} torn lines are left out"] if store.torn else []
-    parts += [f"{store.older} lines of other code or files are left out"] if store.older else []
+    parts += [f"{number_of(store.torn, 'torn line')} left out"] if store.torn else []
+    parts += [f"{number_of(store.older, 'line')} of other code or files left out"] if store.older else []
     if parts:
         typer.echo(f"{store.file}: {', '.join(parts)}", err=True)
 
@@ -129,7 +135,7 @@ def _drive(
     except KeyboardInterrupt:
         kept = len(store.results) - before
         raise StoppedError(
-            f"{kept} of {len(left)} runs; they are kept in {store.file}, and the same command goes on"
+            f"{kept} of {number_of(len(left), 'run')}, kept in {store.file}; the same command goes on"
         ) from None
 
 
@@ -146,6 +152,11 @@ def _drive_again(file: Path, run_id: str | None, record: Path | None) -> None:
     recorder = Recorder(record, mission, settings, spec.seed, arm=True, start_us=0)
     try:
         report = prepared(spec, folder, recorder).run()
+    except Exception as error:
+        if is_interrupt(error):
+            raise
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        raise CampaignError(f"{spec.world}, seed {spec.seed}: the run ended with an error: {what:.300}") from error
     finally:
         recorder.close()
     contacts = f", {report.collisions} contacts" if report.collisions else ""

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import typer
 
 from companion.cli.inputs import EXIT_BAD_INPUT, writable, written
-from sitl.campaign.campaign_file import load_campaign
+from companion.storage.files import write_whole
+from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.pictures import times
 from sitl.cli.campaign import BAD_INPUT, drive_campaign
 from sitl.experiments import drawing
@@ -38,9 +40,12 @@ def compare(
     try:
         file = out / FILE
         writable(file)
-        worlds = [str(one) if not one.suffix else os.path.relpath(one, out) for one in missions]
-        with written(file):
-            file.write_text(_campaign(worlds, planners, controllers, seeds), encoding="utf-8")
+        _check(missions, planners, controllers)
+        with written(file), TemporaryDirectory(dir=out) as folder:
+            tried = Path(folder) / FILE
+            tried.write_text(_campaign(missions, tried.parent, planners, controllers, seeds), encoding="utf-8")
+            _load(tried)
+            write_whole(file, _campaign(missions, out, planners, controllers, seeds).encode())
         runs = drive_campaign(file, out, jobs)
         if any(result.complete for _, result in runs):
             with written(out / PLOT):
@@ -52,8 +57,27 @@ def compare(
         raise typer.Exit(EXIT_BAD_INPUT) from error
 
 
-def _campaign(worlds: list[str], planners: str, controllers: str, seeds: int) -> str:
-    """The campaign's file; a list of strings is written alike in JSON and TOML."""
+def _check(missions: list[Path], planners: str, controllers: str) -> None:
+    """Raises CampaignError for what the campaign's file would be blamed for."""
+    for mission in missions:
+        if mission.suffix and not mission.is_file():
+            raise CampaignError(f"{mission}: no such mission file")
+    for option, listed in (("--planners", planners), ("--controllers", controllers)):
+        if not _names(listed):
+            raise CampaignError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
+
+
+def _load(file: Path) -> None:
+    """Raises CampaignError without the file's name: nobody has written it."""
+    try:
+        load_campaign(file)
+    except CampaignError as error:
+        raise CampaignError(str(error).replace(f"{file}: ", "")) from error
+
+
+def _campaign(missions: list[Path], folder: Path, planners: str, controllers: str, seeds: int) -> str:
+    """The campaign's file in a folder; a list of strings is written alike in JSON and TOML."""
+    worlds = [os.path.relpath(one, folder) if one.suffix else str(one) for one in missions]
     lists = {"worlds": worlds, "planners": _names(planners), "controllers": _names(controllers)}
     lines = [f"{key} = {json.dumps(values, ensure_ascii=False)}" for key, values in lists.items()]
     return "\n".join(['name = "compare"', *lines, f"runs = {seeds}"]) + "\n"

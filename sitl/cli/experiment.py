@@ -130,6 +130,9 @@ def experiment(
         # Report a file that cannot be written before the work, not after it.
         writable(json_file)
         writable(docs and docs / "results.md")
+        for option, listed in (("--planners", planners), ("--controllers", controllers), ("--missions", missions)):
+            if listed and not _names(listed):
+                raise ExperimentError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
         options = Options(
             runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, _names(controllers), _names(setups),

@@ -11,18 +11,28 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from companion.executive.warm_up import COMPILING, kernels_warm, warm_up
+from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.drive_run import check_spec, mission_of, settings_of
 from sitl.campaign.run_spec import RunSpec
+from sitl.generators.made_ground import NoWayError
 
 FILE = "runs.jsonl"
 LINES = 10
 """Of progress, where there is no terminal for a bar."""
 
 
+def number_of(count: int, what: str) -> str:
+    """The number with its word, like ``1 run`` or ``2 runs``."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def check_all(left: list[RunSpec], folder: Path) -> None:
     """What could not be driven at all is told before hours of driving. Raises one of ``BAD_INPUT``."""
     for spec in {(spec.world, spec.sensors, spec.faults): spec for spec in left}.values():
-        check_spec(spec, folder)
+        try:
+            check_spec(spec, folder)
+        except NoWayError as error:
+            raise CampaignError(f"worlds: {spec.world!r:.120}, seed {spec.seed}: {error}") from error
 
 
 def warm_up_all(left: list[RunSpec], folder: Path) -> None:

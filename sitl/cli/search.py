@@ -14,7 +14,7 @@ from sitl.campaign.campaign_file import load_campaign
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.workers import driven_here
-from sitl.cli.runs import FILE, check_all, progress, warm_up_all
+from sitl.cli.runs import FILE, check_all, number_of, progress, warm_up_all
 from sitl.search.found_file import counted_from, differences, write_find
 from sitl.search.goals import Goal
 from sitl.search.minimise import minimised
@@ -58,7 +58,7 @@ def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs:
         least = [minimised(find, drive) for find in _of_each_kind(finds)]
     except KeyboardInterrupt:
         kept = len(store.results) - before
-        raise StoppedError(f"{kept} runs; they are kept in {store.file}, and the same command goes on") from None
+        raise StoppedError(f"{number_of(kept, 'run')}, kept in {store.file}; the same command goes on") from None
     _put_out(least, finds, file, goal, place)
 
 
@@ -84,4 +84,5 @@ def _put_out(least: Sequence[Find], finds: Sequence[Find], file: Path, goal: Goa
         )
         typer.echo(f"  differs: {differences(find)}")
         typer.echo(f"  again: rover-sitl campaign {target} --replay {spec.id} --record out/run")
-    typer.echo(f"{len(finds)} runs went wrong, of {len(least)} kinds" if finds else "no run went wrong")
+    told = f"{number_of(len(finds), 'run')} went wrong, of {number_of(len(least), 'kind')}"
+    typer.echo(told if finds else "no run went wrong")

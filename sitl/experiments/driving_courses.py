@@ -16,11 +16,11 @@ from companion.executive.mission_progress import TargetStatus
 from companion.mapping.evidence_map import EvidenceMap, restore
 from companion.mission.mission import Mission
 from companion.recording.recorder import NullRecorder
-from sitl.campaign.time_bound import UNKNOWN_S, time_bound_s
 from sitl.experiments.controllers import SENSORS, mission_on
 from sitl.experiments.experiment import POINTS
 from sitl.experiments.navigation import settings_with
 from sitl.experiments.off_model import parameters_for
+from sitl.experiments.time_bound import UNKNOWN_S, time_bound_s
 from sitl.generators.made_ground import made
 from sitl.lockstep import Drive, DriveOutcome, Report
 from sitl.scenario import SOMEWHERE, Scenario, outline_of, scenario_from_mission

@@ -154,7 +154,10 @@ class NavigationReport(ExperimentReport):
         tables = [
             terminal_table(f"{NAME}: {name}", SHORT, without_intervals(self._rows(name))) for name in self._names()
         ]
-        tables[-1].caption, tables[-1].caption_justify = self._runs_explained().replace("*", ""), "left"
+        tables[-1].caption, tables[-1].caption_justify = (
+            " ".join(self._runs_explained().replace("*", "").split()),
+            "left",
+        )
         return tables
 
     def as_json(self) -> dict[str, object]:

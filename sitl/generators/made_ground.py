@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Cell, inflated
-from companion.core.own_parts import OwnPartError
+from companion.core.own_parts import OwnKind, OwnPartError, blamed
 from companion.mission.mission import HomePoint, MoverSpec
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import make_planner
@@ -60,7 +60,10 @@ def made(kind: str, seed: int, given: Parameters | None = None, movers: int = 0)
     parameters = given or parameters_of(kind)()
     rng = np.random.default_rng([seed, stream_of(kind), GROUND_STREAM])
     for _ in range(MOST_DRAWN):
-        solid = parameters.draw(rng)
+        with blamed(OwnKind.WORLD, kind):
+            solid = parameters.draw(rng)
+        if not isinstance(solid, np.ndarray):
+            raise OwnPartError(f"world {kind!r:.80} draws {type(solid).__name__}; begin with empty(), and return it")
         if solid.shape != empty().shape or solid.dtype != np.bool_:
             raise OwnPartError(f"world {kind!r:.80} draws {solid.dtype} of shape {solid.shape}; begin with empty()")
         start_m = float(rng.uniform(END_M, NORTH_M - END_M)), 3.0

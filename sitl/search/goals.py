@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-from sitl.campaign.policies import Policy, broken
+from sitl.campaign.drive_run import NO_GROUND
+from sitl.campaign.policies import ERROR, Policy, broken
 from sitl.campaign.run_spec import RunResult
 from sitl.lockstep import DriveOutcome
 
@@ -32,6 +33,7 @@ class Goal(StrEnum):
     """The last look at a setpoint refuses it."""
 
 
+NOT_DRIVEN = (ERROR, NO_GROUND)
 POLICIES = {
     Goal.COLLISION: Policy.NO_CONTACT,
     Goal.UNREACHABLE: Policy.NO_FALSE_UNREACHABLE,
@@ -43,7 +45,9 @@ TOLD_TWICE = {**POLICIES, Goal.STUCK: Policy.ENDS}
 
 
 def shows(goal: Goal, result: RunResult) -> bool:
-    """Whether the run has done it."""
+    """Whether the run has done it. One that was not driven has done nothing."""
+    if result.outcome in NOT_DRIVEN:
+        return False
     if goal in POLICIES:
         return POLICIES[goal] in broken(result)
     if goal == Goal.CLEARANCE:

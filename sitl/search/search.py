@@ -17,12 +17,12 @@ import numpy as np
 
 from companion.settings import SettingsError
 from sitl.campaign.campaign_file import CampaignError, CampaignTable
-from sitl.campaign.drive_run import NO_GROUND, settings_of
-from sitl.campaign.policies import ERROR, Policy, broken
+from sitl.campaign.drive_run import settings_of
+from sitl.campaign.policies import Policy, broken
 from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
 from sitl.campaign.worded import GroundSpec
 from sitl.search.genes import Gene, Values, genes_of, spec_with
-from sitl.search.goals import TOLD_TWICE, Goal, distance, shows
+from sitl.search.goals import NOT_DRIVEN, TOLD_TWICE, Goal, distance, shows
 
 GENERATIONS = 8
 SPREAD = 0.25
@@ -109,7 +109,7 @@ def _finds(goal: Goal, base: RunSpec, genes: tuple[Gene, ...], values: Values, r
 
 
 def _distance(goal: Goal, result: RunResult | None) -> float:
-    return IMPOSSIBLE if result is None or result.outcome in (ERROR, NO_GROUND) else distance(goal, result)
+    return IMPOSSIBLE if result is None or result.outcome in NOT_DRIVEN else distance(goal, result)
 
 
 def _values(genes: tuple[Gene, ...], shares: Sequence[float]) -> Values:

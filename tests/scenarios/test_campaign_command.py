@@ -108,6 +108,7 @@ def test_what_is_done_is_not_done_again_and_a_run_can_be_driven_again(
     [
         (["missing.toml"], "missing.toml: cannot be read"),
         (["short.toml", "--replay", "abc"], "--replay ID and --record FOLDER go together"),
+        (["short.toml", "--budget", "5"], "--budget goes with --search"),
         (["short.toml", "--replay", "abc", "--record", "r"], "no run of this campaign"),
         (["short.toml", "--out", "/proc/none"], "cannot be written"),
         (["short.toml", "--cluster", "tcp://127.0.0.1:1"], "nobody answers there"),
@@ -129,8 +130,15 @@ def test_planners_side_by_side_are_a_campaign_with_a_plot(campaign: Path, monkey
     assert "dijkstra / astar" in result.output
     assert Path("out/compare/times.png").read_bytes().startswith(b"\x89PNG")
     assert [line["run"]["planner"] for line in lines_of(Path("out/compare"))] == ["astar", "dijkstra"]
-    bad = CliRunner().invoke(app, ["compare", "yard.toml", "--planners", "astr"])
-    assert bad.exit_code == 2 and "unknown planner 'astr'" in bad.output
+    kept = Path("out/compare/campaign.toml").read_text(encoding="utf-8")
+    for arguments, says in (
+        (("yard.toml", "--planners", "astr"), "planners 1: unknown planner 'astr'"),
+        (("yard.toml", "--planners", " , "), "--planners ' , ': names nothing"),
+        (("no.toml", "--planners", "astar"), "no.toml: no such mission file"),
+    ):
+        bad = CliRunner().invoke(app, ["compare", *arguments])
+        assert bad.exit_code == 2 and bad.output.startswith(says) and len(bad.output.splitlines()) == 1
+    assert Path("out/compare/campaign.toml").read_text(encoding="utf-8") == kept, "the old report's commands still work"
 
 
 GLASS = 'size_m = [20.0, 10.0]\n[[obstacle]]\nline_m = [[0.0, 8.0], [10.0, 8.0]]\nwidth_m = 0.3\nmaterial = "glass"\n'
@@ -151,7 +159,7 @@ def test_a_search_finds_makes_small_and_writes_what_drives_the_same_again(tmp_pa
     assert told[-4].startswith("collision: behind.toml, seed 0, points: collision, touched")
     assert told[-3] == "  differs: nothing"
     assert told[-2] == f"  again: rover-sitl campaign {found} --replay {found.stem[-12:]} --record out/run"
-    assert told[-1].endswith("runs went wrong, of 1 kinds")
+    assert told[-1].endswith("runs went wrong, of 1 kind")
     number = len(lines_of(out / "search-collision"))
 
     again = CliRunner().invoke(app, command, env={"COLUMNS": "200"})

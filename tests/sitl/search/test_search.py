@@ -96,6 +96,8 @@ def test_files_of_a_find_count_from_its_own_folder(tmp_path: Path) -> None:
         (Goal.COLLISION, RunResult("points", "collision", touched=1), True),
         (Goal.COLLISION, RunResult("points", "reached", clearance_m=0.01), False),
         (Goal.CLEARANCE, RunResult("points", "reached", clearance_m=0.01), True),
+        (Goal.CLEARANCE, RunResult("", "no-ground"), False),
+        (Goal.CLEARANCE, RunResult("", "error"), False),
         (Goal.STUCK, RunResult("points", "time limit", targets=1, bound_s=20.0), True),
         (Goal.STUCK, RunResult("points", "time limit", targets=1, bound_s=20.0, waits_for="a person"), False),
         (Goal.STUCK, RunResult("points", "time limit", targets=1, bound_s=0.0), False),

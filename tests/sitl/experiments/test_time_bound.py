@@ -10,7 +10,7 @@ import pytest
 
 from sitl.campaign.drive_run import mission_of
 from sitl.campaign.run_spec import RunSpec
-from sitl.campaign.time_bound import ways_m
+from sitl.experiments.time_bound import ways_m
 from sitl.generators.kinds import GroundKind
 from sitl.generators.made_ground import made
 from sitl.plant.outline import Outline

@@ -1,0 +1,23 @@
+"""What goes wrong in a part of one's own is told as its fault; what goes wrong elsewhere is not."""
+
+from __future__ import annotations
+
+import pytest
+
+from companion.core.own_parts import OwnKind, OwnPartError, blamed
+
+
+def test_what_fails_in_a_part_of_ones_own_is_told_with_its_name_in_one_line() -> None:
+    with pytest.raises(OwnPartError) as told, blamed(OwnKind.PLANNER, "lines:Lines"):
+        raise RuntimeError("my\nbug")
+    assert str(told.value) == "planner 'lines:Lines' fails: RuntimeError: my bug"
+
+
+def test_what_fails_in_one_of_the_programs_own_stays_as_it_is() -> None:
+    with pytest.raises(ZeroDivisionError), blamed(OwnKind.PLANNER, "astar"):
+        raise ZeroDivisionError
+
+
+def test_an_interrupt_is_nobodys_fault() -> None:
+    with pytest.raises(KeyboardInterrupt), blamed(OwnKind.CONTROLLER, "dice:Dice"):
+        raise KeyboardInterrupt
