@@ -152,7 +152,7 @@ def _draw(ground: MadeGround, seed: int, file: Path) -> None:
 
     from sitl.experiments import drawing
 
-    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
+    figure = Figure(figsize=(9.0, 7.6), layout="constrained")
     panel = figure.subplots()
     world = ground.world
     edges = (0.0, world.width_m, 0.0, world.height_m)
