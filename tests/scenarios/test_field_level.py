@@ -97,7 +97,8 @@ def test_navigation_says_how_many_runs_a_row_is_made_of(tmp_path):
     assert result.exit_code == 0, result.output
     assert "2 runs, with seeds 3 to 4" in " ".join((tmp_path / "docs" / "results.md").read_text().split())
     assert "of all that were made" in result.output
-    assert result.output.count("2/2") == result.output.count("1/1") == 4
+    assert result.output.count("1/1") == 4, "astar on the four maps"
+    assert result.output.count("2/2") == 4 + 2 * 5, "hybrid on them, and both on five kinds of made grounds"
 
 
 def test_each_experiment_replaces_only_its_own_section(tmp_path):
