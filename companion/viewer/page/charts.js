@@ -14,7 +14,7 @@ const STEPS_S = [5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 18000];
 export class Charts {
   /** `jump(t)`, of a report, goes to a time that is clicked. */
   constructor(place, model, jump) {
-    Object.assign(this, { place, model, jump, version: -1, last: 0, later: 0, stale: false });
+    Object.assign(this, { place, model, jump, version: -1, last: 0, later: null, stale: false });
     const all = KINDS.map((kind, index) => this.part(kind, index));
     // A record is whole: what it never tells gets no chart.
     this.parts = jump ? all.filter(({ index }) => model.figures.values[index].some((value) => value !== null)) : all;

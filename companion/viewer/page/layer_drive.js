@@ -4,6 +4,9 @@ import { placed } from "viewer/geometry.js";
 
 /** The rover is never drawn smaller than this, however far away the map is seen from. */
 const SMALLEST_ROVER_PX = 26;
+/** A velocity is drawn as far as it leads in so long. */
+const TOLD_S = 1.5;
+const TOLD_STEP_S = 0.1;
 const OLD_RAYS_S = 1;
 /** Rays all round have no first and no last one. */
 const FULL_TURN = 2 * Math.PI - 0.01;
@@ -45,6 +48,19 @@ export function drawAhead(pen, frame) {
   drawSetpoint(pen, frame);
 }
 
+/** Where a velocity and a turn rate lead in the next seconds, if they are followed at once. */
+function along([north, east, heading], { speed, turn }) {
+  const places = [[north, east]];
+  let [n, e, h] = [north, east, heading];
+  for (let t = 0; t < TOLD_S; t += TOLD_STEP_S) {
+    h += 0.5 * turn * TOLD_STEP_S;
+    [n, e] = [n + speed * TOLD_STEP_S * Math.cos(h), e + speed * TOLD_STEP_S * Math.sin(h)];
+    h += 0.5 * turn * TOLD_STEP_S;
+    places.push([n, e]);
+  }
+  return places;
+}
+
 function drawSetpoint(pen, { setpoint, pose }) {
   const { context, camera, colours } = pen;
   if (!setpoint || !pose) return;
@@ -66,6 +82,8 @@ function drawSetpoint(pen, { setpoint, pose }) {
     context.lineTo(x + 46 * Math.sin(direction), y - 46 * Math.cos(direction));
     pen.stroke(colours.halo, 6);
     pen.stroke(colours.setpoint, 3, [4, 4]);
+  } else if (setpoint.kind === "velocity") {
+    pen.line(along(pose, setpoint), { colour: colours.setpoint, width: 3, casing: 3 });
   }
 }
 
