@@ -15,12 +15,9 @@ GAP_S, JUMP_M = 5.0, 5.0
 
 
 class EarlierTrack:
-    """Takes frames in the order of time; one that is earlier than the last begins another track."""
+    """Takes frames of one run, in the order of time."""
 
     def __init__(self) -> None:
-        self._begin()
-
-    def _begin(self) -> None:
         self._places: list[list[float]] = []
         self._every = self._skipped = 1
         self._newest: list[float] | None = None
@@ -29,8 +26,6 @@ class EarlierTrack:
     def add(self, frame: dict[str, Any]) -> None:
         """One more; the frames between are left out once there have been many."""
         t, pose, speed_m_s = frame["t"], frame["pose"], abs(frame["speed"] or 0.0)
-        if self._newest is not None and t < self._newest[0]:
-            self._begin()
         if pose is None:
             self._starts = True
             return

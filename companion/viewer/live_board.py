@@ -151,6 +151,7 @@ class LiveBoard:
         if frame["t"] < self._past_s - BACK_S:  # a page forgets what was before, too
             self.past.clear()
             self._news.clear()
+            self.earlier = EarlierTrack()
         self.frame, self.frame_count = frame, self.frame_count + 1
         news = frame["news"]
         self._news.extend(news)

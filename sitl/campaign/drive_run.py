@@ -21,7 +21,6 @@ from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.wire_watch import WireWatch
 from sitl.campaign.worded import NOTHING, OWN, GroundSpec, SensorSpec, faults_of
-from sitl.experiments.dead_companion import STOOD_M_S
 from sitl.experiments.experiment import GUARD
 from sitl.experiments.off_model import off_model
 from sitl.experiments.time_bound import time_bound_s
@@ -29,7 +28,7 @@ from sitl.generators.made_ground import MadeGround, NoWayError, made
 from sitl.lockstep import Drive, TrackPoint
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
 from sitl.simulator import ROOM_REACH_M
-from sitl.world.truth import SimStart
+from sitl.world.truth import STOOD_M_S, SimStart
 
 NO_GROUND = "no-ground"
 """The outcome where a kind with these parameters gives no ground with a way."""
@@ -142,7 +141,7 @@ def _mission_across(ground: MadeGround) -> Mission:
 
 def _result(run: Drive, clearance_m: float, watch: WireWatch, cpu_s: float) -> RunResult:
     report, executor, hits = run.report, run.companion.executor, run.simulator.collisions
-    run_into = sum(hit.mover is not None and abs(hit.speed_m_s) < STOOD_M_S for hit in hits)
+    run_into = sum(hit.was_run_into for hit in hits)
     statuses = Counter(status for _, status in report.targets)
     return RunResult(
         led_by="" if executor is None else executor.controller,

@@ -6,7 +6,7 @@ A pair is one ground and one rover off its model, driven by both. Times are comp
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -84,14 +84,19 @@ def mission_on(ground: MadeGround, controller: str, seed: int) -> Mission:
     return Mission(f"{ground.kind} {seed}", (Target("goal", place, 0.0, OnBlocked.SKIP),), grid, ROVER, sitl=sitl)
 
 
+def scenario_on(ground: MadeGround, rover: RoverSpec, controller: str) -> Scenario:
+    """The simulation of such a mission; with the guard where motions are planned."""
+    start = SimStart(*ground.start_m, np.pi / 2.0, SOMEWHERE)
+    return Scenario(ground.world, start, SENSORS, outline_of(rover), parameters_for(rover, controller))
+
+
 def drive(kind: GroundKind, controller: str, seed: int, off: float = OFF_MODEL, late_s: float = 0.0) -> GroundDrive:
     """One drive. ``off``: the rover differs by up to this share from what the companion takes it for."""
     ground = made(kind, seed)
     mission = mission_on(ground, controller, seed)
     drivetrain, limits = off_model(np.random.default_rng((seed, 52)), off)
-    parameters = {**parameters_for(ROVER, controller), **limits}
-    start = SimStart(*ground.start_m, np.pi / 2.0, SOMEWHERE)
-    scenario = Scenario(ground.world, start, SENSORS, outline_of(ROVER), parameters, drivetrain=drivetrain)
+    scenario = scenario_on(ground, ROVER, controller)
+    scenario = replace(scenario, parameters={**scenario.parameters, **limits}, drivetrain=drivetrain)
     run = Drive(mission, scenario, settings_for(controller), seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report = run.run()
     reached = run.companion.outcome.complete and report.outcome in (DriveOutcome.REACHED, DriveOutcome.COLLISION)

@@ -22,6 +22,7 @@ from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 from sitl.simulator import Simulator
+from sitl.world.truth import STOOD_M_S
 
 NAME = "dead-companion"
 MISSIONS = (
@@ -33,8 +34,6 @@ HEAD = ("mission", "runs", "moving", "touched", "run into", "m/s", "metres", "s"
 TIME_LIMIT_S = 1800.0
 STANDS_S, STANDS_M_S, STANDS_RAD_S = 4.0, 0.02, 0.02
 """A rover stands that has neither moved nor turned for longer than a velocity is remembered."""
-STOOD_M_S = 0.1
-"""What moves runs into a rover that is slower than this, not the rover into it."""
 WATCHED_S = 120.0
 STEP_S = 0.25
 
@@ -98,7 +97,7 @@ def die(told: Told, time_s: float) -> Death:
     before = len(simulator.collisions)
     went_s = watch_until_it_stands(simulator)
     hits = simulator.collisions[before:]
-    standing = [one for one in hits if one.mover and abs(one.speed_m_s) < STOOD_M_S]
+    standing = [one for one in hits if one.was_run_into]
     return Death(
         told.mission.name,
         told.suite,

@@ -1,6 +1,6 @@
 """Driving times of several planners: shipped missions and made grounds in lock-step, with the rover's own dynamics.
 
-Beside each: the same drives on the known map, and the time that nothing can beat.
+Beside each: the same drives on the known map, and the least time that is possible.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Series:
 
     @property
     def bound_s(self) -> float:
-        """Mean of the times that nothing can beat; NaN where that was not asked for."""
+        """Mean of the least times; NaN where that was not asked for, or there is none."""
         return float(np.mean([math.nan if one.bound_s is None else one.bound_s for one in self.drives]))
 
 

@@ -5,7 +5,6 @@ Nouns: course.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,14 +15,13 @@ from companion.executive.mission_progress import TargetStatus
 from companion.mapping.evidence_map import EvidenceMap, restore
 from companion.mission.mission import Mission
 from companion.recording.recorder import NullRecorder
-from sitl.experiments.controllers import SENSORS, mission_on
+from sitl.experiments.controllers import mission_on, scenario_on
 from sitl.experiments.experiment import POINTS
 from sitl.experiments.navigation import settings_with
-from sitl.experiments.off_model import parameters_for
 from sitl.experiments.time_bound import UNKNOWN_S, time_bound_s
 from sitl.generators.made_ground import made
 from sitl.lockstep import Drive, DriveOutcome, Report
-from sitl.scenario import SOMEWHERE, Scenario, outline_of, scenario_from_mission
+from sitl.scenario import scenario_from_mission
 from sitl.world.truth import SimStart
 from sitl.world.world import World
 
@@ -56,7 +54,9 @@ def drive(course: Mission | str, planner: str, seed: int, known: bool = False) -
     if isinstance(course, Mission):
         mission, scenario = course, scenario_from_mission(course)
     else:
-        mission, scenario = _on_made_ground(course, seed)
+        ground = made(course, seed)
+        mission = mission_on(ground, POINTS, seed)
+        scenario = scenario_on(ground, mission.rover, POINTS)
     run = Drive(mission, scenario, settings_with(planner), seed, NullRecorder(), TIME_LIMIT_S)
     told = _ToldMap(run) if known else None
     report = run.run() if told is None else run.run(told.observe, TELL_S)
@@ -64,14 +64,6 @@ def drive(course: Mission | str, planner: str, seed: int, known: bool = False) -
     executor = run.companion.executor
     bound_s = time_bound_s(mission, scenario, executor) if known and executor is not None else UNKNOWN_S
     return CourseDrive(report, None if bound_s == UNKNOWN_S else bound_s)
-
-
-def _on_made_ground(kind: str, seed: int) -> tuple[Mission, Scenario]:
-    ground = made(kind, seed)
-    mission = mission_on(ground, POINTS, seed)
-    start = SimStart(*ground.start_m, math.pi / 2.0, SOMEWHERE)
-    parameters = parameters_for(mission.rover, POINTS)
-    return mission, Scenario(ground.world, start, SENSORS, outline_of(mission.rover), parameters)
 
 
 class _ToldMap:

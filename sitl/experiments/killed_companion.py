@@ -27,7 +27,7 @@ from companion.settings import Settings
 from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
 from companion.storage.files import OsDisk
-from sitl.experiments.dead_companion import STOOD_M_S, SUITES, shipped, with_suite
+from sitl.experiments.dead_companion import SUITES, shipped, with_suite
 from sitl.experiments.experiment import (
     GUARD,
     OFF_MODEL,
@@ -43,6 +43,7 @@ from sitl.experiments.results_page import markdown_table, share_with_interval, t
 from sitl.experiments.soak import Person
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
+from sitl.world.truth import STOOD_M_S
 
 NAME = "killed-companion"
 EAGER = DrivetrainSpec(top_speed_m_s=3.46, lag_s=0.25, track_m=0.6)

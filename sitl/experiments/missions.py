@@ -14,7 +14,7 @@ from companion.mission.mission import Mission
 from companion.recording.recorder import NullRecorder
 from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
-from sitl.experiments.dead_companion import STOOD_M_S, SUITES, shipped, with_suite
+from sitl.experiments.dead_companion import SUITES, shipped, with_suite
 from sitl.experiments.experiment import (
     GUARD,
     OFF_MODEL,
@@ -82,7 +82,7 @@ def drive(
     run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report, executor = run.run(), run.companion.mission_run.executor
     hits = run.simulator.collisions
-    run_into = sum(hit.mover is not None and abs(hit.speed_m_s) < STOOD_M_S for hit in hits)
+    run_into = sum(hit.was_run_into for hit in hits)
     unreached = sum(status is not TargetStatus.REACHED for _, status in report.targets)
     led_by = POINTS if executor is None else executor.controller
     return MissionDrive(

@@ -101,7 +101,7 @@ class Series:
             self.planner,
             f"{self.reached}/{len(self.runs)}",
             f"{np.median(self.over):.3f}" if self.over else "-",
-            mean_with_interval(self._of_grounds(self.over), digits=3),
+            mean_with_interval(_of_grounds([ground for ground, _ in self.arrived], self.over), digits=3),
             self._ratio(reference),
             f"{np.mean([run.return_steps for run in self.runs]):.1f}",
             f"{np.median([run.searches for run in self.runs]):.0f}",
@@ -114,23 +114,19 @@ class Series:
         """Steps over the reference's on the same grounds."""
         if reference is None or reference is self:
             return "-" if reference is None else "1"
-        others = {id(ground): one.steps for ground, one in reference.arrived}
-        steps = self._of_grounds([one.steps for _, one in self.arrived])
-        if len(set(map(id, self.grounds))) == 1:
-            other = next(iter(others.values()), None)
-            return "-" if other is None else ratio_with_interval(np.array([(each, other) for each in steps], float))
-        grounds = dict.fromkeys(id(ground) for ground, _ in self.arrived)
-        pairs = [(own, others[ground]) for own, ground in zip(steps, grounds, strict=True) if ground in others]
-        return ratio_with_interval(np.array(pairs, float).reshape(-1, 2))
+        others = {ground: float(one.steps) for ground, one in reference.arrived}
+        arrived = [(ground, one) for ground, one in self.arrived if ground in others]
+        own, its = ([one.steps for _, one in arrived], [others[ground] for ground, _ in arrived])
+        means = [_of_grounds([ground for ground, _ in arrived], values) for values in (own, its)]
+        return ratio_with_interval(np.column_stack(means))
 
-    def _of_grounds(self, values: Sequence[float]) -> list[float]:
-        """Of several grounds the mean on each: it is they that were drawn. ``values``: of the runs that arrived."""
-        if len(set(map(id, self.grounds))) == 1:
-            return list(values)
-        of_ground: dict[int, list[float]] = {}
-        for (ground, _), value in zip(self.arrived, values, strict=True):
-            of_ground.setdefault(id(ground), []).append(value)
-        return [float(np.mean(own)) for own in of_ground.values()]
+
+def _of_grounds(grounds: Sequence[Ground], values: Sequence[float]) -> list[float]:
+    """Of runs on several grounds the mean on each, since the grounds were drawn; on a single one as they are."""
+    of_ground: dict[Ground, list[float]] = {}
+    for ground, value in zip(grounds, values, strict=True):
+        of_ground.setdefault(ground, []).append(value)
+    return list(values) if len(of_ground) == 1 else [float(np.mean(own)) for own in of_ground.values()]
 
 
 HEAD = (

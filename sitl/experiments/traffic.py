@@ -6,7 +6,7 @@ The claim of Wang et al. 2007, with a rover that drives: contacts and times over
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from typing import ClassVar
 
@@ -19,17 +19,15 @@ from companion.mission.mission import Mission
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
-from sitl.experiments.controllers import SENSORS, mission_on
-from sitl.experiments.dead_companion import STOOD_M_S
-from sitl.experiments.experiment import GUARD, POINTS, Advance, ExperimentReport, Options, each, shipped_missions
+from sitl.experiments.controllers import mission_on, scenario_on
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, each, shipped_missions
 from sitl.experiments.intervals import mean_with_interval, ratio_with_interval
 from sitl.experiments.off_model import parameters_for
 from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
 from sitl.generators.kinds import GroundKind
 from sitl.generators.made_ground import made
 from sitl.lockstep import Drive
-from sitl.scenario import SOMEWHERE, Scenario, outline_of, scenario_from_mission
-from sitl.world.truth import SimStart
+from sitl.scenario import scenario_from_mission
 
 NAME = "traffic"
 MISSIONS = ("crossing.toml", "depot.toml")
@@ -85,20 +83,20 @@ def settings_for(way: Way) -> Settings:
 
 def drive(course: Mission | str, way: Way, seed: int) -> TrafficDrive:
     """One drive. ``course``: a mission, or a kind of ground with ``MOVERS`` things that drive to and fro."""
-    guard = GUARD if way is Way.MOTIONS else {}
+    settings = settings_for(way)
+    controller = settings.guidance.controller
     if isinstance(course, Mission):
         mission, scenario = course, scenario_from_mission(course)
-        scenario.parameters.update(guard)
+        parameters = {**scenario.parameters, **parameters_for(mission.rover, controller)}
+        scenario = replace(scenario, parameters=parameters)
     else:
         ground = made(course, seed, movers=MOVERS)
-        mission = mission_on(ground, POINTS, seed)
-        start = SimStart(*ground.start_m, np.pi / 2.0, SOMEWHERE)
-        parameters = {**parameters_for(mission.rover, POINTS), **guard}
-        scenario = Scenario(ground.world, start, SENSORS, outline_of(mission.rover), parameters)
-    run = Drive(mission, scenario, settings_for(way), seed, NullRecorder(), TIME_LIMIT_S)
+        mission = mission_on(ground, controller, seed)
+        scenario = scenario_on(ground, mission.rover, controller)
+    run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S)
     report = run.run()
     hits = run.simulator.collisions
-    run_into = sum(hit.mover is not None and abs(hit.speed_m_s) < STOOD_M_S for hit in hits)
+    run_into = sum(hit.was_run_into for hit in hits)
     missed = sum(status is not TargetStatus.REACHED for _, status in report.targets)
     name = mission.name if isinstance(course, Mission) else MADE
     return TrafficDrive(name, way, seed, len(hits) - run_into, run_into, report.refused, missed, report.driving_time_s)

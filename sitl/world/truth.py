@@ -30,6 +30,10 @@ class GeoPlace(Protocol):
         ...
 
 
+STOOD_M_S = 0.1
+"""A rover that is slower than this stands."""
+
+
 @dataclass(frozen=True, slots=True)
 class SimStart:
     """Where the rover is switched on: in the world frame, and as latitude and longitude.
@@ -78,6 +82,11 @@ class Collision:
     mover: str | None
     speed_m_s: float
     door: str | None = None
+
+    @property
+    def was_run_into(self) -> bool:
+        """Whether the rover stood, and something that moves came along."""
+        return self.mover is not None and self.speed_m_s < STOOD_M_S
 
     @property
     def what(self) -> str:

@@ -76,7 +76,8 @@ export class Panel {
       const row = this.targetRows[i];
       setAttribute(row.node, "data-kind", now ? "now" : kindOf(status));
       setIcon(row.sign, now ? "now" : ({ skipped: "skip" }[kindOf(status)] ?? kindOf(status)));
-      setText(row.status, now ? (frame.state === "driving" ? "going there" : "next") : ended && status === "pending" ? "not reached" : status);
+      const ahead = frame?.state === "driving" ? "going there" : "next";
+      setText(row.status, now ? ahead : ended && status === "pending" ? "not reached" : status);
       setText(row.far, frame?.pose && status === "pending" ? metres(distance(frame.pose, target.place)) : "");
     });
     const known = `Targets, ${reached} of ${scene?.targets?.length} reached`;
