@@ -90,10 +90,12 @@ def graph_searches() -> None:
 
 
 def drive() -> None:
-    """Maps and guidance, and what combines the planners."""
+    """Maps, guidance and the viewer's tiles, and what combines the planners."""
     from companion.executive.warm_up import warm_up
+    from companion.viewer import map_tiles
 
     warm_up(Settings())
+    map_tiles.warm_up()
 
 
 def manoeuvres() -> None:

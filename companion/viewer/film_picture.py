@@ -17,7 +17,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from companion.viewer.film_names import film_names
 from companion.viewer.map_colours import CELL_COLOURS, UNKNOWN_COLOUR
-from companion.viewer.map_tiles import TILE, UNKNOWN, cells_of
+from companion.viewer.map_tiles import TILE, cells_of
+from companion.viewer.tile_kernels import UNKNOWN
 from companion.viewer.wire import tiles_in
 
 SIDE_PIXELS = 640

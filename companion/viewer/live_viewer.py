@@ -16,6 +16,7 @@ from companion.settings import Settings
 from companion.settings.versions import versions
 from companion.viewer import wire
 from companion.viewer.feed import ViewerFeed
+from companion.viewer.map_tiles import warm_up
 from companion.viewer.page_requests import PageRequests
 from companion.viewer.web_process import WebPlace, WebProcess
 
@@ -29,6 +30,7 @@ class LiveViewer:
 
     def __init__(self, place: WebPlace, say: Callable[[str], None], station: LocalStation | None = None) -> None:
         """``station``: asks the companion for what people ask for on the page; None: nobody may. Raises WebError."""
+        warm_up()
         self.web = WebProcess(place, takes_actions=station is not None)
         self.station = station
         self._requests = None if station is None else PageRequests(station)

@@ -24,7 +24,8 @@ from companion.viewer import foxglove
 from companion.viewer.foxglove_schemas import SCHEMAS
 from companion.viewer.frame import mode_name, news_of
 from companion.viewer.map_colours import CELL_COLOURS
-from companion.viewer.map_tiles import FREE, SEEN_OBSTACLE, cell_classes
+from companion.viewer.map_tiles import cell_classes
+from companion.viewer.tile_kernels import FREE, SEEN_OBSTACLE
 
 MAP_S, PATH_S = 2.0, 0.5
 """So often each is written, if it has changed."""

@@ -11,7 +11,8 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.viewer.map_tiles import CLOSED, COSTLY, FREE, SEEN_OBSTACLE, TILE, run_lengths
+from companion.viewer.map_tiles import TILE, run_lengths
+from companion.viewer.tile_kernels import CLOSED, COSTLY, FREE, SEEN_OBSTACLE
 from companion.viewer.wire import Place
 from sitl.world.world import World
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
 from selenium import webdriver
@@ -45,7 +46,7 @@ class Page:
         """All that can be read."""
         return str(self.run("return document.body.innerText"))
 
-    def run(self, script: str, *values: object) -> object:
+    def run(self, script: str, *values: object) -> Any:
         return self.driver.execute_script(script, *values)
 
     def until(self, holds: Callable[[], object], limit_s: float = PATIENCE_S) -> None:
@@ -78,6 +79,17 @@ class Page:
         element = self.driver.find_element(By.CSS_SELECTOR, selector)
         left, top = x - element.size["width"] // 2, y - element.size["height"] // 2
         ActionChains(self.driver).move_to_element_with_offset(element, left, top).click().perform()
+
+    def drag(self, selector: str, right: int, down: int) -> None:
+        """From the middle of the first element so far, with the mouse."""
+        element = self.driver.find_element(By.CSS_SELECTOR, selector)
+        chain = ActionChains(self.driver, duration=50).move_to_element(element).click_and_hold()
+        chain.move_by_offset(right, down).release().perform()
+
+    def darken(self) -> None:
+        """As on a system that is set to dark."""
+        dark = {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
 
     @property
     def faults(self) -> list[str]:

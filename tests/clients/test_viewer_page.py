@@ -40,6 +40,40 @@ return shown.flatMap(([a, p], i) => shown.slice(i + 1).filter(([b, q]) => !a.con
 """
 
 
+COLOURS = """
+const canvas = document.querySelector('canvas'), box = canvas.getContext('2d'), count = {};
+const data = box.getImageData(0, 0, canvas.width, canvas.height).data;
+for (let i = 0; i < data.length; i += 4) {
+    const key = '#' + [0, 1, 2].map(j => data[i + j].toString(16).padStart(2, '0')).join('');
+    count[key] = (count[key] ?? 0) + 1;
+}
+return count
+"""
+"""How many pixels of the map have each colour."""
+MIDDLE = """
+const canvas = document.querySelector('canvas'), box = canvas.getContext('2d'), w = canvas.width, h = canvas.height;
+const data = box.getImageData(0, 0, w, h).data;
+let [n, x, y] = [0, 0, 0];
+for (let i = 0; i < w * Math.floor(0.9 * h); i++) {  // below is the scale of colours
+    const hex = '#' + [0, 1, 2].map(j => data[4 * i + j].toString(16).padStart(2, '0')).join('');
+    if (hex === arguments[0]) [n, x, y] = [n + 1, x + i % w, y + Math.floor(i / w)];
+}
+return [n, x / n, y / n]
+"""
+"""How many pixels of the map have this colour, and where the middle of them is."""
+LIGHT = {"unknown": "#9fa9b3", "free": "#ffffff", "obstacle": "#12181e", "rover": "#e04a00"}
+DARK = {"unknown": "#101418", "free": "#4b5864", "obstacle": "#f3f6f8", "rover": "#ff7a33"}
+"""Of the map, as the legend shows them."""
+FAST = "#5cb531"
+"""The track where the rover drove at its cruise speed."""
+SEEK = (
+    "const s = document.querySelector('input[type=range]'); s.value = +s.max * arguments[0];"
+    "s.dispatchEvent(new Event('input', {bubbles: true}))"
+)
+PRESSED = "return [...document.querySelectorAll('.map-buttons [aria-pressed=true]')].map(b => b.innerText.trim())"
+"""Buttons over the map that are pressed."""
+
+
 def address_of(program: Program) -> str:
     return program.says(r"the run is shown at (\S+)").group(1)
 
@@ -163,13 +197,19 @@ def test_the_simulator_alone_is_shown_as_such(tmp_path: Path) -> None:
             shown.shows("Stopped by the user")
 
 
-def test_a_report_plays_from_its_file_to_its_end(tmp_path: Path) -> None:
-    mission = MISSIONS / "one-obstacle.toml"
-    with ours(tmp_path, "sitl", "drive", mission, "--record", "rec") as program:
+@pytest.fixture(scope="module")
+def report_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The report of a drive round an obstacle."""
+    folder = tmp_path_factory.mktemp("report")
+    with ours(folder, "sitl", "drive", MISSIONS / "one-obstacle.toml", "--record", "rec") as program:
         assert program.ended() == 0
-    with ours(tmp_path, "companion", "report", "rec", "--out", "report.html") as program:
+    with ours(folder, "companion", "report", "rec", "--out", "report.html") as program:
         assert program.ended() == 0, program.output
-    file = tmp_path / "report.html"
+    return folder / "report.html"
+
+
+def test_a_report_plays_from_its_file_to_its_end(report_file: Path) -> None:
+    file = report_file
     text = file.read_text(encoding="utf-8")
     assert file.stat().st_size < 2_000_000 and not re.search(r"(src|href)=\"(?!data:)", text)
     with page(DESKTOP) as report:
@@ -205,6 +245,53 @@ def test_a_report_plays_from_its_file_to_its_end(tmp_path: Path) -> None:
         for tab in ("Now", "Decisions", "Tables"):
             report.press(tab)
             fits(report, PHONE)
+        assert report.faults == []
+
+
+def test_a_report_is_walked_through_by_clicks(report_file: Path) -> None:
+    def time_of() -> str:
+        return str(report.run("return document.querySelector('output.time').innerText"))
+
+    with page(DESKTOP) as report:
+        report.open(report_file.as_uri())
+        report.shows("1 of 1 targets reached")
+        report.press("Decisions")
+        row = ".decision-list li:nth-child(3) button"
+        told = str(report.run(f"return document.querySelector('{row}').innerText"))
+        report.click(row)
+        current = "return document.querySelector('.decision-list [aria-current=true]')?.innerText"
+        report.until(lambda: report.run(current) == told)
+        assert told.split(maxsplit=1)[0] in report.text and not time_of().startswith("0:00")
+        report.press("Now")
+        at_row = time_of()
+        report.click_at("canvas.marks", 200, 5)
+        report.until(lambda: time_of() != at_row)
+        report.run(SEEK, 0.6)  # straight on so far
+        _, right, down = report.run(MIDDLE, FAST)
+        before = time_of()
+        report.click_at("canvas", round(right), round(down))
+        report.until(lambda: "0:45" < time_of() < before)
+        report.run(SEEK, 0.8)
+        report.until(lambda: time_of() > before)
+        colours = {name: report.run(COLOURS).get(value, 0) for name, value in LIGHT.items()}
+        assert min(colours["unknown"], colours["free"]) > 5000 and min(colours.values()) > 30, colours
+        rover = report.run(MIDDLE, LIGHT["rover"])
+        assert report.run(PRESSED) == ["All", "Figures"]
+        report.drag("canvas", 120, 60)
+        moved = report.run(MIDDLE, LIGHT["obstacle"])
+        assert report.run(PRESSED) == ["Figures"] and report.run(MIDDLE, LIGHT["rover"]) != rover
+        report.press("Follow the rover (F)")
+        assert report.run(PRESSED) == ["Follow", "Figures"] and report.run(MIDDLE, LIGHT["obstacle"]) != moved
+        report.press("North is up; press for heading up")
+        report.shows("Ahead")
+        report.darken()
+        report.until(lambda: report.run(COLOURS).get(DARK["free"], 0) > 5000)
+        dark = report.run(COLOURS)
+        assert all(dark.get(value, 0) > 30 for value in DARK.values())
+        assert (
+            report.run("return getComputedStyle(document.querySelector('.viewer')).backgroundColor")
+            == "rgb(10, 13, 16)"
+        )
         assert report.faults == []
 
 

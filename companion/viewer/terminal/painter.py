@@ -115,10 +115,10 @@ class Painter:
         return self._ended and self._thread.is_alive()
 
     def print_last(self, rows_below: int = 0) -> None:
-        """Print the last view without its news, so that it stays on the terminal, with room for some lines below."""
+        """Print the last view, so that it stays on the terminal, with room for some lines below."""
         if self._make is not None:
             rows = max(self._console.height - 1 - rows_below, 1)
-            self._console.file.write("\n".join(self._lines(self._make(), rows, news=False)) + "\n")
+            self._console.file.write("\n".join(self._lines(self._make(), rows)) + "\n")
 
     def _suspend(self, number: int, frame: FrameType | None) -> None:
         """Ctrl-Z: restore the terminal until this process continues."""
@@ -180,12 +180,12 @@ class Painter:
         if text:
             self._write(text)
 
-    def _lines(self, view: View, rows: int, *, news: bool = True) -> list[str]:
+    def _lines(self, view: View, rows: int) -> list[str]:
         """A view as lines of characters and control codes, at most so many."""
         console = self._console
         colour = not console.no_color and console.color_system is not None
         with console.capture() as captured:
-            console.print(render(view, console.width, rows, colour=colour, news=news), height=rows)
+            console.print(render(view, console.width, rows, colour=colour), height=rows)
         return captured.get().rstrip("\n").split("\n")[:rows]
 
     def _write(self, text: str) -> None:

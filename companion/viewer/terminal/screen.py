@@ -57,12 +57,12 @@ class View:
     headline: Headline | None = None
 
 
-def render(view: View, columns: int, rows: int, *, colour: bool, news: bool = True) -> RenderableType:
-    """The whole screen, with this many columns and rows of characters. ``news``: whether to show them."""
+def render(view: View, columns: int, rows: int, *, colour: bool) -> RenderableType:
+    """The whole screen, with this many columns and rows of characters."""
     head = _headline(view.headline, columns)
     if columns < SMALLEST[0] or rows < SMALLEST[1]:
         return _without_picture(view, head, columns, rows)
-    news_rows = max(NEWS_ROWS, rows // NEWS_SHARE) if news else 0
+    news_rows = max(NEWS_ROWS, rows // NEWS_SHARE)
     main_rows = rows - len(head) - news_rows
     beside = min(max(PANEL_COLUMNS[0], columns // 3), PANEL_COLUMNS[1])
     main = Layout(size=main_rows)
@@ -71,8 +71,7 @@ def render(view: View, columns: int, rows: int, *, colour: bool, news: bool = Tr
     facts = facts_table(view.sections, beside - 4, main_rows - 2)
     main["panel"].update(Panel(facts, border_style="dim"))
     below = [Layout(Group(*head), size=len(head))] if head else []
-    if news_rows:
-        below.append(Layout(Group(*_newest(view.events, columns, news_rows)), size=news_rows))
+    below.append(Layout(Group(*_newest(view.events, columns, news_rows)), size=news_rows))
     layout = Layout()
     layout.split_column(main, *below)
     return layout

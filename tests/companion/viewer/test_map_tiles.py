@@ -14,19 +14,16 @@ from companion.mapping.evidence_map import EvidenceMap, forget, new_map
 from companion.settings import Settings
 from companion.viewer.map_tiles import (
     AT_ONCE,
-    CLOSED,
-    COSTLY,
-    FREE,
+    GLANCES,
     IN_TURN,
     MOST_NEAR,
-    SEEN_OBSTACLE,
     TILE,
-    UNKNOWN,
     TileWatch,
     cell_classes,
     cells_of,
     run_lengths,
 )
+from companion.viewer.tile_kernels import CLOSED, COSTLY, FREE, SEEN_OBSTACLE, UNKNOWN
 from companion.viewer.wire import tile_message, tiles_in
 
 MAPPING = Settings().mapping
@@ -111,6 +108,31 @@ def test_a_look_at_a_large_map_takes_some_tiles_and_comes_to_all_of_them() -> No
     assert sum(counts) == -(-height // TILE) * -(-width // TILE) and max(counts) <= AT_ONCE + IN_TURN + 9
     watch.tell_again()
     assert watch.is_behind and len(watch.changed(evidence, NedPoint(5.0, 5.0), 5.0)) >= AT_ONCE
+
+
+def test_a_large_map_of_which_little_is_known_is_told_soon_and_what_is_near_first() -> None:
+    evidence = new_evidence(800)
+    s = evidence.subdivisions
+    for north, east in ((10, 10), (400, 400), (790, 790)):
+        evidence.base.weights[north, east] = 1.0
+    watch, told, looks = TileWatch(evidence), [], 0
+    while watch.is_behind:
+        told += [place for place, _ in watch.changed(evidence, NedPoint(410.0, 410.0), 1.0)]
+        looks += 1
+    tiles = (-(-evidence.log_odds.shape[0] // TILE)) ** 2
+    assert told == [(at * s // TILE, at * s // TILE) for at in (400, 790, 10)]
+    assert looks == -(-tiles // GLANCES) > 5
+
+
+def test_a_tile_that_could_not_be_told_and_is_empty_since_is_told_as_empty() -> None:
+    evidence, here = new_evidence(), NedPoint(5.0, 5.0)
+    watch = TileWatch(evidence)
+    evidence.log_odds[0, 0] = -1.0
+    assert [place for place, _ in watch.changed(evidence, here, 5.0)] == [(0, 0)]
+    evidence.log_odds[0, 1] = -1.0
+    watch.tell_again(place for place, _ in watch.changed(evidence, here, 5.0))
+    evidence.log_odds[0, :2] = 0.0
+    assert [(place, int(cells_of(runs).max())) for place, runs in watch.changed(evidence, here, 5.0)] == [((0, 0), 0)]
 
 
 def test_a_sensor_that_sees_far_costs_no_more_and_what_it_finds_there_is_told_in_a_while() -> None:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from companion.viewer.map_tiles import CLOSED, COSTLY, FREE, SEEN_OBSTACLE, TILE, cells_of
+from companion.viewer.map_tiles import TILE, cells_of
+from companion.viewer.tile_kernels import CLOSED, COSTLY, FREE, SEEN_OBSTACLE
 from sitl.network.event_log import EventLog
 from sitl.simulator import Simulator
 from sitl.view.true_rays import rays_of

@@ -24,9 +24,9 @@ def sketch(fields: list[str], rover: tuple[float, float] = (0.5, 0.5), heading_d
     return Sketch((Layer(Kind.WALL, where, 1.0, 0.0, 0.0),), Disc(*rover, 0.3), math.radians(heading_deg), **options)
 
 
-def screen(view: View, columns: int = 80, rows: int = 24, colour: bool = False, news: bool = True) -> list[str]:
+def screen(view: View, columns: int = 80, rows: int = 24, colour: bool = False) -> list[str]:
     console = Console(file=io.StringIO(), width=columns, height=rows, color_system="truecolor" if colour else None)
-    console.print(render(view, columns, rows, colour=colour, news=news), height=rows)
+    console.print(render(view, columns, rows, colour=colour), height=rows)
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue().rstrip("\n").split("\n")
 
