@@ -74,6 +74,15 @@ PRESSED = "return [...document.querySelectorAll('.map-buttons [aria-pressed=true
 """Buttons over the map that are pressed."""
 
 
+PILOT = """
+[[fault]]
+kind = "pilot"
+since = "driving"
+start_s = 5.0
+mode = "MANUAL"
+"""
+
+
 def address_of(program: Program) -> str:
     return program.says(r"the run is shown at (\S+)").group(1)
 
@@ -156,11 +165,18 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows("Stopped by the user")
             program.ended()
             port = address.rstrip("/").rpartition(":")[2]
-            next_one = ("sitl", "drive", MISSIONS / "open.toml", "--web", port, "--speedup", "1")
-            with ours(tmp_path, *next_one) as another:
+            faults = tmp_path / "pilot.toml"
+            faults.write_text(PILOT, encoding="utf-8")
+            next_one = ("sitl", "drive", MISSIONS / "open.toml", "--faults", faults, "--web", port, *acting)
+            with ours(tmp_path, *next_one, "--speedup", "1") as another:
                 address_of(another)
                 desktop.shows("Open ground", "Driving to half way")
                 assert name not in desktop.text, "nothing of the run before is left"
+                desktop.open("about:blank")
+                desktop.open(f"{address}#token={token.read_text(encoding='ascii').strip()}")
+                desktop.shows("MANUAL")
+                desktop.press("Go on")
+                desktop.shows("Request refused: it was not paused by a request", "The pilot drives (MANUAL)")
                 another.child.send_signal(signal.SIGINT)
 
 
@@ -199,13 +215,20 @@ def test_the_simulator_alone_is_shown_as_such(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def report_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The report of a drive round an obstacle."""
+    """The report of a drive round an obstacle, opened at once in what the system says is its browser."""
     folder = tmp_path_factory.mktemp("report")
+    browser = folder / "browser"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {folder}/opened\n')
+    browser.chmod(0o755)
     with ours(folder, "sitl", "drive", MISSIONS / "one-obstacle.toml", "--record", "rec") as program:
         assert program.ended() == 0
-    with ours(folder, "companion", "report", "rec", "--out", "report.html") as program:
-        assert program.ended() == 0, program.output
-    return folder / "report.html"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("BROWSER", f"{browser} %s")
+        with ours(folder, "companion", "report", "rec", "--out", "report.html", "--open") as program:
+            assert program.ended() == 0, program.output
+    file = folder / "report.html"
+    assert (folder / "opened").read_text() == f"{file.as_uri()}\n"
+    return file
 
 
 def test_a_report_plays_from_its_file_to_its_end(report_file: Path) -> None:

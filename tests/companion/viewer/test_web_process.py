@@ -261,6 +261,12 @@ def test_places_and_tokens(tmp_path: Path) -> None:
         web_place("8000", file)
 
 
+def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("companion.viewer.web_process.find_spec", lambda name: None if name == "uvicorn" else object())
+    with pytest.raises(WebError, match=r"^--web: uvicorn is not installed; install rover-companion\[web\]$"):
+        web_place("8000", None)
+
+
 def test_a_port_that_is_taken_is_told_at_once() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
