@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import numpy as np
 import typer
 
 from companion.cli.inputs import EXIT_BAD_INPUT
+from companion.cli.patience import Patience
 from companion.planning.planner_contract import broken_by, random_problem
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings
 
 EXIT_BROKEN = 3
+SLOW_S = 10.0
+"""After so long without an answer to one problem it is told."""
 BUDGET = Budget(min_epochs=2, max_epochs=15, control_points=(4, 6), population=18)
 SIGNS = {True: "#", False: "."}
 
@@ -35,17 +39,25 @@ def check_planner(
     found = 0
     for number in range(seed, seed + problems):
         problem = random_problem(np.random.default_rng(number))
+        patience = Patience(SLOW_S, partial(_tell, f"{name}: problem {number}: no answer for {SLOW_S:.0f} s yet"))
+        patience.begin()
         try:
             wrong = broken_by(planner, problem, BUDGET, number)
             found += not wrong and planner.plan(problem, BUDGET, np.random.default_rng(number)).path is not None
         except Exception as error:
             wrong = " ".join(f"it raised {type(error).__name__}: {error}".split())
+        finally:
+            patience.end()
         if wrong:
             typer.echo(f"{name}: problem {number}: {wrong}", err=True)
             typer.echo(picture(problem), err=True)
             typer.echo(f"again: rover-companion check-planner {name} --problems 1 --seed {number}", err=True)
             raise typer.Exit(EXIT_BROKEN)
     typer.echo(f"{name}: keeps the contract on {problems} problems; it found a path in {found} of them")
+
+
+def _tell(text: str) -> None:
+    typer.echo(text, err=True)
 
 
 def picture(problem: PlanningProblem) -> str:

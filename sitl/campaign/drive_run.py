@@ -55,9 +55,10 @@ class Nearest:
 
 def drive(spec: RunSpec, folder: Path) -> RunResult:
     """One run. ``folder``: that of the campaign's file. An error of the programs is a result, too."""
-    began_s = processor_s()
+    began_s, targets = processor_s(), 0
     try:
         run, near = prepared(spec, folder), Nearest()
+        targets = len(run.mission.targets)
         watch = WireWatch(run)
         run.run(lambda status: near.look(run), LOOK_S)
         return _result(run, near.clearance_m, watch, processor_s() - began_s)
@@ -67,7 +68,7 @@ def drive(spec: RunSpec, folder: Path) -> RunResult:
         if is_interrupt(error):
             raise KeyboardInterrupt from None  # within a compiled loop
         text = " ".join(f"{type(error).__name__}: {error}".split())
-        return RunResult("", ERROR, cpu_s=processor_s() - began_s, said=text[:300])
+        return RunResult("", ERROR, targets=targets, cpu_s=processor_s() - began_s, said=text[:300])
 
 
 def prepared(spec: RunSpec, folder: Path, recorder: Recorder | NullRecorder | None = None) -> Drive:

@@ -23,7 +23,7 @@ from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
-from sitl.cli.runs import FILE, check_all, number_of, progress, warm_up_all
+from sitl.cli.runs import FILE, alone_in, check_all, number_of, progress, warm_up_all
 from sitl.cli.search import search_campaign
 from sitl.generators.made_ground import NoWayError
 from sitl.scenario import ScenarioError
@@ -86,16 +86,17 @@ def drive_campaign(
     table, folder = load_campaign(file), file.resolve().parent
     place = out or Path("out") / table.name
     writable(place / FILE)
-    digests = Digests(folder)
-    store = RunStore(place / FILE, digests.of)
-    specs = list(specs_of(table))
-    _say_what_there_is(store, specs)
-    left = [spec for spec in specs if spec.id not in store.results]
-    if left:
-        check_all(left, folder)
-        _drive(console, left, store, digests, jobs, cluster)
-    runs = store.of(specs)
-    put_out(console, table, runs, file, place, parquet=parquet)
+    with alone_in(place):
+        digests = Digests(folder)
+        store = RunStore(place / FILE, digests.of)
+        specs = list(specs_of(table))
+        _say_what_there_is(store, specs)
+        left = [spec for spec in specs if spec.id not in store.results]
+        if left:
+            check_all(left, folder)
+            _drive(console, left, store, digests, jobs, cluster)
+        runs = store.of(specs)
+        put_out(console, table, runs, file, place, parquet=parquet)
     errors = sum(result.outcome == ERROR for _, result in runs)
     if errors:
         ended = f"{number_of(errors, 'run')} ended with an error"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +12,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from companion.cli.patience import Patience
 from companion.executive.warm_up import COMPILING, kernels_warm, warm_up
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.drive_run import check_spec, mission_of, settings_of
@@ -19,6 +22,9 @@ from sitl.generators.made_ground import NoWayError
 FILE = "runs.jsonl"
 LINES = 10
 """Of progress, where there is no terminal for a bar."""
+QUIET_S = 120.0
+"""After so long without a run that ends it is told: a planner of one's own may never come back."""
+QUIET = f"no run has ended for {QUIET_S:.0f} s: a long one, or a planner or controller that never answers"
 
 
 def number_of(count: int, what: str) -> str:
@@ -46,6 +52,20 @@ def warm_up_all(left: list[RunSpec], folder: Path) -> None:
 
 
 @contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Nobody else drives a campaign into this folder meanwhile. Raises CampaignError."""
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError:
+        text = f"{folder}: another campaign writes its runs here; wait for its end, or choose another folder with --out"
+        raise CampaignError(text) from None
+    finally:
+        os.close(held)
+
+
+@contextmanager
 def progress(console: Console, total: int) -> Iterator[Callable[[int], None]]:
     """A bar, or a few lines where there is no terminal; it is told how many more are done."""
     columns = (
@@ -55,13 +75,23 @@ def progress(console: Console, total: int) -> Iterator[Callable[[int], None]]:
     done = told = 0
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
         task = progress.add_task("runs", total=total)
+        patience = Patience(QUIET_S, lambda: progress.console.print(QUIET) if console.is_terminal else _tell(QUIET))
+        patience.begin()
 
         def advance(more: int) -> None:
             nonlocal done, told
             done = min(done + more, total)
+            patience.begin()
             progress.update(task, completed=done)
             if not console.is_terminal and LINES * done // total > told:
                 told = LINES * done // total
-                typer.echo(f"{done} of {total} runs", err=True)
+                _tell(f"{done} of {total} runs")
 
-        yield advance
+        try:
+            yield advance
+        finally:
+            patience.end()
+
+
+def _tell(text: str) -> None:
+    typer.echo(text, err=True)

@@ -14,7 +14,7 @@ from sitl.campaign.campaign_file import load_campaign
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.workers import driven_here
-from sitl.cli.runs import FILE, check_all, number_of, progress, warm_up_all
+from sitl.cli.runs import FILE, alone_in, check_all, number_of, progress, warm_up_all
 from sitl.search.found_file import counted_from, differences, write_find
 from sitl.search.goals import Goal
 from sitl.search.minimise import minimised
@@ -43,23 +43,24 @@ def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs:
     table, folder, console = load_campaign(file), file.resolve().parent, Console()
     place = (out or Path("out") / table.name) / f"search-{goal}"
     writable(place / FILE)
-    digests = Digests(folder)
-    store = RunStore(place / FILE, digests.of)
-    bases = first_bases(table)
-    check_all(bases, folder)
-    warm_up_all(bases, folder)
-    drive, finds = _Driver(store, digests, jobs), list[Find]()
-    before = len(store.results)
-    try:
-        with progress(console, budget) as advance:
-            for found, driven in searched(table, goal, budget, drive):
-                finds += found
-                advance(driven)
-        least = [minimised(find, drive) for find in _of_each_kind(finds)]
-    except KeyboardInterrupt:
-        kept = len(store.results) - before
-        raise StoppedError(f"{number_of(kept, 'run')}, kept in {store.file}; the same command goes on") from None
-    _put_out(least, finds, file, goal, place)
+    with alone_in(place):
+        digests = Digests(folder)
+        store = RunStore(place / FILE, digests.of)
+        bases = first_bases(table)
+        check_all(bases, folder)
+        warm_up_all(bases, folder)
+        drive, finds = _Driver(store, digests, jobs), list[Find]()
+        before = len(store.results)
+        try:
+            with progress(console, budget) as advance:
+                for found, driven in searched(table, goal, budget, drive):
+                    finds += found
+                    advance(driven)
+            least = [minimised(find, drive) for find in _of_each_kind(finds)]
+        except KeyboardInterrupt:
+            kept = len(store.results) - before
+            raise StoppedError(f"{number_of(kept, 'run')}, kept in {store.file}; the same command goes on") from None
+        _put_out(least, finds, file, goal, place)
 
 
 def _of_each_kind(finds: Sequence[Find]) -> list[Find]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from companion.cli import check_planner
 from companion.cli.commands import app
 from companion.core.own_parts import OwnKind, OwnPartError, source_of
 from companion.mission.load import load_mission
@@ -59,6 +61,13 @@ def test_a_planner_that_breaks_the_contract_is_told_with_the_problem(
     number = told.output.rpartition("--seed ")[2].strip()
     again = CliRunner().invoke(app, ["check-planner", lines, "--problems", "1", "--seed", number])
     assert again.output == told.output
+
+
+def test_a_planner_that_does_not_answer_for_long_is_told(lines: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(check_planner, "broken_by", lambda *problem: time.sleep(0.3) or "")
+    monkeypatch.setattr(check_planner, "SLOW_S", 0.1)
+    told = CliRunner().invoke(app, ["check-planner", lines, "--problems", "1"])
+    assert "problem 0: no answer for 0 s yet" in told.output, told.output
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from sitl.campaign import drive_run
 from sitl.campaign.drive_run import drive
 from sitl.campaign.policies import Policy, broken
 from sitl.campaign.run_spec import RunSpec
-from sitl.lockstep import TrackPoint
+from sitl.lockstep import Drive, TrackPoint
 
 SPEC = RunSpec("maze", "hybrid", "points", "own", "none", False, 0.0, 0.0, "shipped", 1, 100.0, "{}")
 
@@ -23,6 +23,15 @@ def test_an_error_of_the_programs_is_a_result(monkeypatch: pytest.MonkeyPatch) -
     result = drive(SPEC, Path())
     assert (result.outcome, result.said) == ("error", "ValueError: no such thing") and result.cpu_s >= 0.0
     assert broken(result) == (Policy.NO_ERROR,) and not result.complete
+
+
+def test_an_error_on_the_way_leaves_all_targets_missed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(run: Drive) -> None:
+        raise ValueError("on the way")
+
+    monkeypatch.setattr(drive_run, "WireWatch", fails)
+    result = drive(SPEC, Path())
+    assert (result.outcome, result.reached, result.targets) == ("error", 0, 1)
 
 
 def test_an_interrupt_within_a_compiled_loop_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
