@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from companion.core.frames import GeoPoint, NedPoint, Pose
 from companion.core.scan import RangeScan
+from companion.viewer.even_rays import even_rays
 from companion.viewer.foxglove_schemas import UNUSED
 
 Json = dict[str, Any]
@@ -71,14 +72,12 @@ def laser_scan(unix_us: int, scan: RangeScan) -> Json:
 
     A single beam becomes two readings, at the edges of its width: one reading has no direction for the viewers.
     """
-    bearings, ranges = scan.bearing_rad, np.where(np.isfinite(scan.range_m), scan.range_m, 0.0)
-    first_rad, last_rad = -float(bearings[0]), -float(bearings[-1])
-    if len(bearings) == 1:
+    rays = even_rays(scan)
+    ranges = np.where(np.isfinite(rays.range_m), rays.range_m, 0.0)
+    first_rad, last_rad = -rays.first_rad, -(rays.first_rad + rays.step_rad * (len(ranges) - 1))
+    if len(ranges) == 1:
         half_rad = 0.5 * scan.beam_width_rad
         first_rad, last_rad, ranges = first_rad + half_rad, last_rad - half_rad, np.repeat(ranges, 2)
-    else:
-        # Bearings may pass from 180 to -180 degrees on the way.
-        last_rad = first_rad - float((bearings[1] - bearings[0]) % (2.0 * math.pi)) * (len(bearings) - 1)
     return {
         "timestamp": stamp(unix_us),
         "frame_id": ROVER,

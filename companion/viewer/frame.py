@@ -36,6 +36,7 @@ from companion.safety.reasons import Activity, EndReason, LatchReason, RunPhase,
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.events import RoverMode
 from companion.vehicle.state import VehicleState
+from companion.viewer.even_rays import even_rays
 from companion.viewer.map_tiles import TILE
 
 FORMAT = 1
@@ -323,12 +324,10 @@ def _rays(vehicle: VehicleState, now_s: float) -> Json | None:
 
 
 def _thinned(scan: RangeScan) -> Json:
-    every = math.ceil(len(scan.bearing_rad) / MOST_RAYS)
-    bearings, ranges = scan.bearing_rad[::every], scan.range_m[::every]
-    step = float(bearings[1] - bearings[0]) if len(bearings) > 1 else 0.0
+    first_rad, step_rad, ranges = even_rays(scan, MOST_RAYS)
     far_m = round(scan.max_range_m, 2)
     metres = [None if math.isnan(one) else (far_m if math.isinf(one) else round(one, 2)) for one in ranges.tolist()]
-    return {"from": round(float(bearings[0]), 4), "step": round(step, 5), "m": metres, "max_m": far_m}
+    return {"from": round(first_rad, 4), "step": round(step_rad, 5), "m": metres, "max_m": far_m}
 
 
 def _movers(executor: MissionExecutor, now_s: float) -> list[Json]:
