@@ -18,6 +18,7 @@ from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of, told
 from companion.viewer.map_tiles import TileWatch
+from companion.viewer.steady_frame import SteadyFrame
 
 FRAME_S, TILES_S, SCENE_S = 0.19, 0.5, 2.0
 """So often each is told, in real time."""
@@ -55,6 +56,7 @@ class ViewerFeed:
         self._frame_s = self._tiles_s = self._scene_s = -math.inf
         self._news: list[Json] = []
         self._rates = Arrivals()
+        self.steady = SteadyFrame()
         self.touched: Sequence[Sequence[float]] | None = None
         """Where a simulated rover touched something, north and east; whoever knows it writes it here."""
 
@@ -77,6 +79,8 @@ class ViewerFeed:
         if self._receiver.is_full:
             return
         self._frame_s = now_s
+        executor = self._companion.executor
+        self.steady.note(None if executor is None else executor.layout.origin)
         self._tell_scene(now_s)
         self._tell_tiles(status, now_s)
         self._tell_frame(status)
@@ -95,7 +99,8 @@ class ViewerFeed:
         if now_s - self._scene_s < SCENE_S and not another:
             return
         self._scene_s = now_s
-        scene = {**scene_of(companion.mission_run.mission, companion.mission_run, self._epoch), **self._always}
+        scene = scene_of(companion.mission_run.mission, companion.mission_run, self._epoch)
+        scene = {**self.steady.scene(scene), **self._always}
         if scene != self._scene and self._put(scene):
             self._scene = scene
 
@@ -127,7 +132,7 @@ class ViewerFeed:
             self._news = []
 
     def _frame(self, status: Status) -> Json:
-        frame = frame_of(self._companion, status)
+        frame = self.steady.frame(frame_of(self._companion, status))
         frame["news"] = self._news
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
         frame["contacts"] = None if self.touched is None else len(self.touched)

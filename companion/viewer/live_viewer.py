@@ -86,9 +86,10 @@ class LiveViewer:
         asked = self.web.asked()
         if self._requests is None or self._companion is None:
             return
+        origin = None if self._feed is None else self._feed.steady.origin
         for one in asked:
             try:
-                self._requests.take(one, self._companion)
+                self._requests.take(one, self._companion, origin)
             except (ValueError, TypeError, KeyError, OverflowError) as error:  # the next one is heard all the same
                 self._say(f"a request of the page is no use: {type(error).__name__}: {error}")
         for answer in self._requests.answered(self._companion):

@@ -11,7 +11,7 @@ from typing import Any
 
 from companion.app import Companion
 from companion.core.clock import stopwatch_s
-from companion.core.frames import LocalFrame, NedPoint
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.mavlink.local_station import LocalStation
 from companion.vehicle.events import RequestAnswer, RequestForm, RoverMode
 
@@ -71,13 +71,14 @@ class PageRequests:
             return True
         return not self._moments[0][1] <= shown_s <= self._moments[-1][1] + OLD_S
 
-    def take(self, asked: Json, companion: Companion) -> None:
+    def take(self, asked: Json, companion: Companion, origin: GeoPoint | None = None) -> None:
         """A request as the web process passes it on.
 
-        ``number``, ``action``, ``place`` (north and east), and what the page showed then: ``goal`` and the time ``t``.
+        ``number``, ``action``, ``place`` (north and east of ``origin``, or of the companion's own), and what the page
+        showed then: ``goal`` and the time ``t``.
         """
         number, action, shown_s = int(asked["number"]), str(asked["action"]), asked.get("t")
-        fault = TOO_OLD if self._is_late(shown_s) and action != "pause" else self._ask(action, asked, companion)
+        fault = TOO_OLD if self._is_late(shown_s) and action != "pause" else self._ask(action, asked, companion, origin)
         if fault:
             self._answer(number, action, fault, ok=fault == NOT_PAUSED)
         else:
@@ -113,7 +114,7 @@ class PageRequests:
                 self._unconfirmed.remove(asked)
                 self._answer(asked.number, asked.action, "" if changed else NOT_CHANGED)
 
-    def _ask(self, action: str, asked: Json, companion: Companion) -> str:
+    def _ask(self, action: str, asked: Json, companion: Companion, origin: GeoPoint | None) -> str:
         """Why a request is not passed on, in words; empty if it is."""
         if action == "resume" and companion.mission_run.is_driving:
             return NOT_PAUSED
@@ -124,7 +125,7 @@ class PageRequests:
         if executor is None:
             return NOT_DRIVING
         if action == "goto":
-            self._station.send_to(LocalFrame(executor.layout.origin).to_geo(NedPoint(*asked["place"])))
+            self._station.send_to(LocalFrame(origin or executor.layout.origin).to_geo(NedPoint(*asked["place"])))
             return ""
         progress = executor.progress
         if asked.get("goal") != progress.goal.name:

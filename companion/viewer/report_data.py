@@ -29,6 +29,7 @@ from companion.viewer.frame import frame_of, news_of, scene_of
 from companion.viewer.map_tiles import TileWatch
 from companion.viewer.report_tables import Run, differences, tables_of
 from companion.viewer.run_tally import RunTally
+from companion.viewer.steady_frame import SteadyFrame
 from companion.viewer.wire import tile_message
 
 FRAME_S, PATH_S, TILES_S = 0.4, 1.2, 1.0
@@ -88,6 +89,7 @@ def joined(record: Record, watched: ReportWatch, run: Run, others: list[Run]) ->
     return {
         "scene": {**watched.scene, **scene},
         "frames": watched.frames,
+        "maps": watched.maps,
         "tiles": watched.tiles,
         "decisions": watched.decisions,
         "contacts": contacts,
@@ -124,6 +126,9 @@ class ReportWatch(ReplayObserver):
         self._frame_s = self._path_s = self._tiles_s = -math.inf
         self._watch: TileWatch | None = None
         self._evidence: object = None
+        self._steady = SteadyFrame()
+        self.maps: list[tuple[float, Json | None]] = []
+        """From when on which map is shown: another one begins where the companion begins it anew."""
 
     @property
     def start(self) -> tuple[float, float]:
@@ -147,9 +152,11 @@ class ReportWatch(ReplayObserver):
         if time_s - self._frame_s < FRAME_S - 1e-6 and not companion.done:
             return
         self._frame_s = time_s
+        executor = companion.executor
+        self._steady.note(None if executor is None else executor.layout.origin)
         if self._start is None and status.pose is not None:
             self._start = status.pose.north_m, status.pose.east_m
-        frame = frame_of(companion, status)
+        frame = self._steady.frame(frame_of(companion, status))
         frame.update({"t": round(time_s, 2), "news": self._news})
         frame["rates"] = self._rates.at(companion.vehicle, status.time_s)
         frame["figures"].update(tick_ms=None, planning_ms=None)  # of the replay, not of the run
@@ -170,7 +177,8 @@ class ReportWatch(ReplayObserver):
         whole = companion.done
         if executor.evidence is not self._evidence:
             self._evidence, self._watch, whole = executor.evidence, TileWatch(executor.evidence), True
-            self.scene = scene_of(self._mission, companion.mission_run, 1)
+            self.scene = self._steady.scene(scene_of(self._mission, companion.mission_run, 1))
+            self.maps.append((round(time_s, 2), self.scene["map"]))
         if self._watch is None or (time_s - self._tiles_s < TILES_S - 1e-6 and not whole):
             return
         self._tiles_s, seen = time_s, companion.vehicle.scan
@@ -192,12 +200,12 @@ class ReportWatch(ReplayObserver):
                 "part": str(decision.part),
                 "reason": str(decision.reason),
                 "lines": explanation_lines(why)[1:],
-                "candidates": [_candidate(one, why) for one in why.candidates],
+                "candidates": [_candidate(one, why, self._steady) for one in why.candidates],
             }
         )
 
 
-def _candidate(candidate: Candidate, why: Explanation) -> Json:
+def _candidate(candidate: Candidate, why: Explanation, steady: SteadyFrame) -> Json:
     path, decision = candidate.path, why.decision
     taken = path is not None and not candidate.part_of and _ends_like(path.cell_array, decision.path)
     return {
@@ -205,8 +213,12 @@ def _candidate(candidate: Candidate, why: Explanation) -> Json:
         "note": candidate.note,
         "cost": None if not math.isfinite(candidate.cost) else round(candidate.cost, 3),
         "taken": taken,
-        "cells": [] if path is None else _thinned(why.grid.places_of(path.cell_array.astype(np.float64))),
-        "curve": None if path is None or path.curve is None else _thinned(why.grid.places_of(path.curve)),
+        "cells": []
+        if path is None
+        else _thinned(steady.places(why.grid.places_of(path.cell_array.astype(np.float64)))),
+        "curve": None
+        if path is None or path.curve is None
+        else _thinned(steady.places(why.grid.places_of(path.curve))),
     }
 
 

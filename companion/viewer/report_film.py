@@ -70,7 +70,8 @@ class Film:
 
     def pictures(self) -> Iterator[Image.Image]:
         """A picture for each moment. To be asked for once."""
-        tiles = deque(self._data["tiles"])
+        begins_s = self._data["maps"][-1][0]  # pictures have the map that was the last one
+        tiles = deque(one for one in self._data["tiles"] if one[0] >= begins_s)
         for frame in self.moments():
             while tiles and tiles[0][0] <= frame["t"]:
                 self._picture.take_tiles(tiles.popleft()[1])

@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 import io
+import json
+import math
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from rich.console import Console
 
 from companion.app import Status
-from companion.recording.recorder import NullRecorder
+from companion.recording.reader import load_record
+from companion.recording.recorder import Recorder
+from companion.replay.replay import replay
 from companion.settings import Settings
+from companion.viewer import feed
+from companion.viewer.feed import ViewerFeed
+from companion.viewer.report_data import ReportWatch
 from companion.viewer.terminal.painter import MakeView, Painter
 from companion.viewer.terminal.screen import View
 from companion.viewer.terminal.sketch import Kind
+from companion.viewer.wire import JSON
 from sitl.cli.drive_view import DriveView
 from sitl.faults.plan import FaultPlan, PilotTakesOver, Reboot
 from sitl.lockstep import Drive, DriveOutcome
@@ -51,22 +62,44 @@ class Driven:
     run: Drive
     views: list[View] = field(default_factory=list)
     statuses: list[Status] = field(default_factory=list)
+    told: list[dict[str, Any]] = field(default_factory=list)
+    """What the page is told."""
+    record: Path = Path()
+
+
+class Page:
+    """Takes what a page is told."""
+
+    def __init__(self) -> None:
+        self.begins_anew = threading.Event()
+        self.is_full = False
+        self.told: list[dict[str, Any]] = []
+
+    def put(self, kind: bytes, payload: bytes) -> bool:
+        self.told += [json.loads(payload)] if kind == JSON else []
+        return True
 
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
-    mission = yard(tmp_path_factory.mktemp("yard"))
+    mission, record = yard(tmp_path_factory.mktemp("yard")), tmp_path_factory.mktemp("record")
     scenario = with_faults(scenario_from_mission(mission), PLAN)
-    run, viewer = Drive(mission, scenario, Settings(), 0, NullRecorder(), 120.0), Kept()
-    shown, statuses = DriveView(run, viewer), []
+    recorder = Recorder(record, mission, Settings(), 0, arm=True, start_us=0)
+    run, viewer, page = Drive(mission, scenario, Settings(), 0, recorder, 120.0), Kept(), Page()
+    shown, fed, statuses = DriveView(run, viewer), ViewerFeed(run.companion, page, {}), []
 
     def observe(status: Status) -> None:
         statuses.append(status)
         shown.observe(status)
+        fed.show(status)
 
-    shown.finish(run.run(observe))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(feed, "FRAME_S", -1.0)
+        patch.setattr(feed, "SCENE_S", -1.0)
+        shown.finish(run.run(observe))
+    recorder.close()
     assert any("EKF origin moved" in text for text in run.companion.outcome.said)
-    yield Driven(run, viewer.views, statuses)
+    yield Driven(run, viewer.views, statuses, page.told, record)
 
 
 def test_targets_and_walls_stay_where_they_are_when_the_autopilot_counts_from_elsewhere(driven: Driven) -> None:
@@ -80,6 +113,25 @@ def test_targets_and_walls_stay_where_they_are_when_the_autopilot_counts_from_el
         seen = next(layer for layer in view.sketch.layers if layer.kind is Kind.SEEN)
         # Its fields are the mission's own, layout from the new origin: they lie elsewhere by less than a field.
         assert (seen.south_m, seen.west_m) == pytest.approx((0.0, 0.0), abs=1.0)
+
+
+def test_on_the_page_and_in_the_report_they_stay_too(driven: Driven) -> None:
+    places = [one["targets"][0]["place"] for one in driven.told if one["kind"] == "scene" and one["targets"]]
+    assert len({one["map_epoch"] for one in driven.told if one["kind"] == "scene"}) == 3
+    assert len(places) > 1 and np.ptp(places, axis=0).max() < 0.1
+    frames = [one for one in driven.told if one["kind"] == "frame" and one["goal"]]
+    assert np.ptp([one["goal"]["place"] for one in frames], axis=0).max() < 0.1
+    record = load_record(driven.record)
+    watch = ReportWatch(record)
+    replay(record, watch)
+    assert watch.scene["targets"][0]["place"] == pytest.approx(places[0], abs=0.1)
+    goals = [one["goal"]["place"] for one in watch.frames if one.get("goal")]
+    assert np.ptp(goals, axis=0).max() < 0.1
+    (_, before), (_, after) = watch.maps
+    assert before is not None and after is not None
+    assert (before["south_m"], before["west_m"]) == pytest.approx((after["south_m"], after["west_m"]), abs=1.0)
+    ends = [one["pose"] for one in (frames[0], frames[-1])]
+    assert math.dist(ends[0][:2], ends[1][:2]) > 2.0, "where it had driven before the failure"
 
 
 def test_the_picture_has_the_target_there_too(driven: Driven, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

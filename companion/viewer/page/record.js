@@ -33,6 +33,8 @@ export class Record {
     this.tables = data.tables ?? [];
     this.others = data.others ?? [];
     this.events = eventsOf(this);
+    this.maps = data.maps ?? [];
+    this.mapTimes = this.maps.map(([t]) => t);
     this.readTiles(data.tiles ?? []);
   }
 
@@ -48,13 +50,19 @@ export class Record {
     this.tiles = new Map();
     for (const [t, text] of messages) {
       for (const { column, row, bytes } of split(fromBase64(text).buffer)) {
-        const key = `${column} ${row}`;
-        if (!this.tiles.has(key)) this.tiles.set(key, { column, row, times: [], versions: [], shown: -1 });
+        const map = this.mapAt(t);
+        const key = `${map} ${column} ${row}`;
+        if (!this.tiles.has(key)) this.tiles.set(key, { map, column, row, times: [], versions: [], shown: -1 });
         const history = this.tiles.get(key);
         history.times.push(t);
         history.versions.push(bytes);
       }
     }
+  }
+
+  // Where the map was begun anew, its tiles are those of another map.
+  mapAt(t) {
+    return Math.max(0, lastNotAbove(this.mapTimes, t));
   }
 
   /** Fills what a model keeps for a whole run. */
@@ -79,7 +87,14 @@ export class Record {
       model.news = this.news.slice(Math.max(0, said - NEWS_SHOWN), said);
       model.newsCount = said;
     }
+    const map = this.mapAt(t);
+    if (this.maps.length > 1 && map !== this.shownMap) {
+      this.shownMap = map;
+      model.takeScene({ ...this.scene, map: this.maps[map][1] });
+      for (const history of this.tiles.values()) history.shown = -1;
+    }
     for (const history of this.tiles.values()) {
+      if (history.map !== map) continue;
       const version = lastNotAbove(history.times, t);
       if (version === history.shown) continue;
       history.shown = version;
