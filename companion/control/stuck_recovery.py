@@ -24,7 +24,8 @@ FRESH_PENALTY = 0.15
 FINAL_PENALTY = 1.0
 TRIES_AT_ONE_PLACE = 3
 SAME_PLACE_M = 0.5
-"""Places nearer to each other than this count as one."""
+"""Places nearer to each other than this count as one; where fields are smaller, those nearer than a field's side: among
+posts half a metre apart, other gaps would be closed with them."""
 CIRCLES_M = (1.0, 2.0, 4.0)
 LINGERS_PER_M = 4.0
 """In a circle the rover may stay for so many times ``stuck_after_s`` for each metre of its radius."""
@@ -90,7 +91,8 @@ class StuckRecovery:
         """Remember the place ahead as costly, in the end as an obstacle, and from now on back out."""
         settings = view.settings.guidance
         self._stuck_places.append(ahead)
-        tries = sum(place.distance_m(ahead) <= SAME_PLACE_M for place in self._stuck_places)
+        near_m = min(SAME_PLACE_M, view.evidence.base.resolution_m)
+        tries = sum(place.distance_m(ahead) <= near_m for place in self._stuck_places)
         final = tries >= TRIES_AT_ONE_PLACE
         penalise(view.evidence, view.evidence.base.cell_at(ahead), FINAL_PENALTY if final else FRESH_PENALTY)
         self._back_until_s = view.pose.time_s + settings.back_out_m / settings.back_out_speed_m_s

@@ -136,6 +136,13 @@ def test_a_place_grows_costly_and_in_the_end_closed() -> None:
     assert math.isclose(float(evidence.penalty.sum()), float(evidence.penalty[field.y, field.x])), "it alone"
 
 
+def test_where_fields_are_small_a_gap_beside_is_another_place() -> None:
+    recovery, evidence = watching(), new_map(empty_grid(80, 80, 0.2), 0.35, SETTINGS.mapping)
+    for number in range(TRIES_AT_ONE_PLACE):
+        recovery.back_out(view(9.0, evidence), NedPoint(8.0, 8.0 + 0.25 * number))
+    assert evidence.penalty.max() == pytest.approx(FRESH_PENALTY)
+
+
 def test_places_near_one_another_count_as_one() -> None:
     recovery, evidence = watching(), seen_map()
     for tries in range(TRIES_AT_ONE_PLACE):
