@@ -46,6 +46,8 @@ MOST_NAME = 200
 HELLO_S, SEND_S = 10.0, 20.0
 ACTIONS_A_SECOND = 5
 WRONG_TOKEN_S = 0.5
+BEAT_S, BEAT = 2.0, json.dumps({"kind": "beat"})
+"""After so long without a word a browser is told that somebody is there: nothing else ends a half-open connection."""
 MOST_UNSENT, LOOK_S = 16_000_000, 0.2
 """Bytes that browsers have not taken yet, of all together; they are looked at so often."""
 SILENT_S = 5.0
@@ -150,7 +152,10 @@ class WebApp:
 
     async def _tell(self, socket: WebSocket, spectator: Spectator, news: asyncio.Event) -> None:
         while True:
-            await news.wait()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(news.wait(), BEAT_S)
+            if not news.is_set():
+                await asyncio.wait_for(socket.send_text(BEAT), SEND_S)
             news.clear()
             while messages := spectator.messages():
                 for message in messages:

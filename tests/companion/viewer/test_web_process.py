@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import os
@@ -20,9 +21,10 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from companion.viewer import wire
+from companion.viewer import server, wire
+from companion.viewer.live_board import LiveBoard
 from companion.viewer.map_tiles import run_lengths
-from companion.viewer.server import MOST_SPECTATORS, fullest
+from companion.viewer.server import MOST_SPECTATORS, WebApp, fullest
 from companion.viewer.web_process import WebError, WebPlace, WebProcess, web_place
 from tests.companion.viewer.test_live_board import SCENE, frame
 
@@ -329,3 +331,44 @@ def test_more_than_may_look_on_at_once_are_told_so(web: WebProcess) -> None:
             except ConnectionClosed as closed:
                 turned_away += closed.rcvd is not None and closed.rcvd.code == 1013
         assert turned_away == 6
+
+
+class Browser:
+    """Stands in for a websocket: says what it is given, then nothing; hears everything at once."""
+
+    def __init__(self, *says: str) -> None:
+        self.headers = {"host": "127.0.0.1"}
+        self.says = list(says)
+        self.heard: list[str] = []
+
+    async def accept(self) -> None:
+        pass
+
+    async def close(self, code: int = 1000) -> None:
+        pass
+
+    async def receive_text(self) -> str:
+        if not self.says:
+            await asyncio.sleep(WAIT_S)
+        return self.says.pop(0)
+
+    async def send_text(self, text: str) -> None:
+        self.heard.append(text)
+
+
+def served_for(seconds: float, app: WebApp, *browsers: Browser) -> None:
+    async def serve() -> None:
+        tasks = [asyncio.create_task(app.socket(one)) for one in browsers]
+        await asyncio.sleep(seconds)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    asyncio.run(serve())
+
+
+def test_a_browser_hears_something_though_there_is_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "BEAT_S", 0.02)
+    browser = Browser('{"kind":"hello"}')
+    served_for(0.3, WebApp(LiveBoard(False), "127.0.0.1", "", False), browser)
+    assert 2 <= len(browser.heard) <= 20 and set(browser.heard) == {'{"kind": "beat"}'}
