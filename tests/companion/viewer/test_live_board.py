@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from companion.viewer.earlier_track import MOST
-from companion.viewer.live_board import NEWS_KEPT, PAST_S, TILES_AT_ONCE, LiveBoard, Spectator
+from companion.viewer.live_board import TILES_AT_ONCE, LiveBoard, Spectator
 from companion.viewer.map_tiles import run_lengths
+from companion.viewer.past import NEWS_KEPT, PAST_S
 from companion.viewer.wire import tile_message, tiles_in
 
 RUNS = run_lengths(np.ones((64, 64), np.uint8))
@@ -135,7 +136,7 @@ def test_nothing_grows_without_bound() -> None:
     spectator = live.join(False, lambda: None)
     for step in range(5000):
         live.take(frame(0.5 * step, "text"))
-    assert len(live.past) == PAST_S and len(live.news_since(0)) == NEWS_KEPT
+    assert len(live.past.frames) == PAST_S and len(live.news_since(0)) == NEWS_KEPT
     for _ in range(100):
         spectator.answer({"kind": "answer"})
     texts, _ = heard(spectator)
