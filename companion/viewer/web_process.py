@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import json
+import os
 import queue
 import secrets
 import socket
@@ -33,6 +34,8 @@ FIRST_WAIT_S, LONGEST_WAIT_S = 0.5, 10.0
 """Before a web process that has ended is started again."""
 CLOSE_S = 1.5
 MOST_ACTIONS = 50
+NICE = 10
+"""By so much the drive comes before the page, which others may keep busy."""
 NEEDED = ("starlette", "uvicorn", "websockets")
 TOKEN_BYTES = 16
 LEAST_TOKEN, MOST_TOKEN_BYTES = 8, 1000
@@ -193,6 +196,7 @@ class WebProcess:
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, pass_fds=(descriptor,),
             start_new_session=True,
         )  # fmt: skip
+        _yield(process.pid)
         self._process, self.started = process, self.started + 1
         hearing = threading.Thread(target=self._hear, args=(process,), name="web requests", daemon=True)
         hearing.start()
@@ -245,6 +249,14 @@ class WebProcess:
                 asked = json.loads(line)
                 if isinstance(asked, dict):
                     self._asked.append(asked)
+
+
+def _yield(process_id: int) -> None:
+    """Let this process come after the drive, as far as the system has it."""
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, process_id, os.getpriority(os.PRIO_PROCESS, 0) + NICE)
+    with contextlib.suppress(OSError):  # where sessions share the processor, a session's own value counts
+        Path(f"/proc/{process_id}/autogroup").write_text(f"{NICE}\n", encoding="ascii")
 
 
 def _listening(place: WebPlace) -> socket.socket:

@@ -24,7 +24,7 @@ from websockets.sync.client import ClientConnection, connect
 from companion.viewer import server, wire
 from companion.viewer.live_board import LiveBoard
 from companion.viewer.map_tiles import run_lengths
-from companion.viewer.server import MOST_SPECTATORS, WebApp, fullest
+from companion.viewer.server import ACTIONS_A_SECOND, MOST_SPECTATORS, WebApp, fullest
 from companion.viewer.web_process import WebError, WebPlace, WebProcess, web_place
 from tests.companion.viewer.test_live_board import SCENE, frame
 
@@ -372,3 +372,31 @@ def test_a_browser_hears_something_though_there_is_no_news(monkeypatch: pytest.M
     browser = Browser('{"kind":"hello"}')
     served_for(0.3, WebApp(LiveBoard(False), "127.0.0.1", "", False), browser)
     assert 2 <= len(browser.heard) <= 20 and set(browser.heard) == {'{"kind": "beat"}'}
+
+
+def test_who_asks_too_fast_is_not_read_further_until_its_time() -> None:
+    browser = Browser('{"kind":"hello"}', *["[]"] * 1000)
+    served_for(0.3, WebApp(LiveBoard(False), "127.0.0.1", "", False), browser)
+    told = [json.loads(one)["text"] for one in browser.heard]
+    assert told == ["not allowed"] * ACTIONS_A_SECOND + ["too many requests"] and len(browser.says) > 900
+
+
+def test_one_who_floods_is_held_up_and_others_get_their_frames(web: WebProcess) -> None:
+    garbage = (bytes([0x81, 0x80 | 2]) + bytes(4) + b"[]") * 10_000
+    with unread(web.place.port) as flood, looking(web) as client:
+        next_of(client, "scene")
+        flood.settimeout(0.3)
+        with pytest.raises(TimeoutError):
+            for _ in range(1000):
+                flood.sendall(garbage)
+        used_s = sum(psutil.Process(web.process_id).cpu_times()[:2])
+        for step in range(10):
+            message = json.dumps(frame(0.2 * step)).encode()
+            wait_until(lambda told=message: web.put(wire.JSON, told))
+            time.sleep(0.04)
+        assert newest(client, 0.2 * 9) == pytest.approx(0.2 * 9)
+        assert sum(psutil.Process(web.process_id).cpu_times()[:2]) - used_s < 0.12
+
+
+def test_the_page_comes_after_the_drive(web: WebProcess) -> None:
+    assert psutil.Process(web.process_id).nice() > psutil.Process().nice()
