@@ -18,7 +18,7 @@ from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of, told
 from companion.viewer.map_tiles import TileWatch
-from companion.viewer.retelling import Receiver, Retelling
+from companion.viewer.retelling import Receiver, Retelling, run_id
 
 FRAME_S, TILES_S, SCENE_S = 0.19, 0.5, 2.0
 """So often each is told, in real time."""
@@ -33,7 +33,7 @@ class ViewerFeed:
     def __init__(self, companion: Companion, receiver: Receiver, always: Json) -> None:
         self._companion = companion
         self._receiver = receiver
-        self._always = always
+        self._always = {"run": run_id(), **always}
         self._watch: TileWatch | None = None
         self._evidence: object = None
         self._epoch = 0

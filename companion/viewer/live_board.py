@@ -18,7 +18,7 @@ from companion.viewer.wire import Place, tile_message, tiles_in
 BACK_S = 1.0
 """A clock that goes back by more than this is another run's."""
 TILES_AT_ONCE = 200
-RUN_KEYS = ("map_epoch", "began_unix_s", "map")
+RUN_KEYS = ("run", "map_epoch", "began_unix_s", "map")
 """Where one of these differs in a scene, a page forgets the map, and mostly everything that it has heard before."""
 
 Json = dict[str, Any]

@@ -8,6 +8,7 @@ Nouns: retelling.
 from __future__ import annotations
 
 import json
+import secrets
 from collections import deque
 from typing import Any, Protocol
 
@@ -15,6 +16,14 @@ from companion.viewer import wire
 from companion.viewer.past import Past
 
 Json = dict[str, Any]
+
+
+def run_id() -> str:
+    """Another one for each run, so that a page never takes one for the other. It is in live scenes alone.
+
+    A simulation that is begun again has the same clock, seed and map.
+    """
+    return secrets.token_hex(8)
 
 
 class Receiver(Protocol):

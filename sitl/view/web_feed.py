@@ -15,7 +15,7 @@ from typing import Any
 from companion.viewer import wire
 from companion.viewer.feed import FRAME_S, NEWS_KEPT, SCENE_S
 from companion.viewer.frame import told
-from companion.viewer.retelling import Receiver, Retelling
+from companion.viewer.retelling import Receiver, Retelling, run_id
 from sitl.simulator import Simulator
 from sitl.view.true_frame import frame_of, scene_of
 from sitl.view.true_map import TrueMap
@@ -44,6 +44,7 @@ class WebFeed:
         self._frame_s = self._scene_s = -math.inf
         self._news: list[Json] = []
         self._retelling = Retelling(receiver)
+        self._run = run_id()
         self._rates = Rates()
         self._heard: dict[str, tuple[int, float]] = {}
         """Packets heard on each link, and when the last came."""
@@ -88,7 +89,7 @@ class WebFeed:
         if now_s - self._scene_s < SCENE_S:
             return
         self._scene_s = now_s
-        scene = scene_of(self._simulator, self._name)
+        scene = {**scene_of(self._simulator, self._name), "run": self._run}
         if scene != self._scene and self._put(scene):
             self._scene = scene
 

@@ -131,3 +131,6 @@ def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_
         [[1.0, 2.0]],
     )
     assert len(heard.scenes) >= 1 and len(heard.tiles) > 3
+    again = Heard()
+    ViewerFeed(run.companion, again, {}).show(run.take_status())
+    assert again.scenes[0]["run"] != heard.scenes[0]["run"] and len({one["run"] for one in heard.scenes}) == 1

@@ -98,6 +98,15 @@ def test_another_map_begins_with_its_scene() -> None:
     assert texts[0]["map_epoch"] == 2 and places == [(7, 7)]
 
 
+def test_another_run_is_told_from_its_beginning() -> None:
+    live = board()
+    spectator = live.join(False, lambda: None)
+    live.take(frame(0.0, "one"))
+    heard(spectator)
+    live.take({**SCENE, "run": "another"})
+    assert [text["kind"] for text in heard(spectator)[0]][:2] == ["scene", "past"]
+
+
 def test_who_comes_after_hours_is_told_the_whole_track() -> None:
     live = board()
     for second in range(20_000):
