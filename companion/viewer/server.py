@@ -52,6 +52,8 @@ MOST_UNSENT, LOOK_S = 16_000_000, 0.2
 """Bytes that browsers have not taken yet, of all together; they are looked at so often."""
 SILENT_S = 5.0
 """After so long a connection without a request is ended: nobody may take all of them."""
+MOST_WAITING = 20
+"""Messages of the run that have been read but not taken."""
 LAST_S = 0.4
 """So long browsers have to be told the last moment."""
 LONGEST_S = 1e9
@@ -299,8 +301,10 @@ def fullest(transports: list[Any], most: int) -> list[Any]:
 
 def _listen(app: WebApp, server: uvicorn.Server, loop: asyncio.AbstractEventLoop) -> None:
     """In a thread: what the run says, to the end."""
+    room = threading.Semaphore(MOST_WAITING)
 
     def take(kind: bytes, payload: bytes) -> None:
+        room.release()
         if kind == wire.TILES:
             app.board.take_tiles(payload)
             return
@@ -312,6 +316,7 @@ def _listen(app: WebApp, server: uvicorn.Server, loop: asyncio.AbstractEventLoop
 
     with contextlib.suppress(ValueError, OSError, RuntimeError):
         while (message := wire.read_message(sys.stdin.buffer)) is not None:
+            room.acquire()  # a server that hangs takes nothing any more: that is noticed at the other end
             loop.call_soon_threadsafe(take, *message)
     with contextlib.suppress(RuntimeError):  # once everybody has been told the last moment
         loop.call_soon_threadsafe(loop.call_later, LAST_S, setattr, server, "should_exit", True)

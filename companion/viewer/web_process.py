@@ -1,7 +1,7 @@
 """The web process as the run sees it: started beside the drive, fed without ever waiting for it, started again.
 
-A thread writes to its pipe. If the process stalls, the queue fills and moments are left out; if it ends, another one is
-started and told everything anew. The drive notices neither.
+A thread writes to its pipe. If the process stalls, the queue fills and moments are left out; if it ends, or takes
+nothing for long, another one is started and told everything anew. The drive notices neither.
 
 Nouns: web process.
 """
@@ -14,6 +14,7 @@ import json
 import os
 import queue
 import secrets
+import select
 import socket
 import stat
 import subprocess
@@ -32,9 +33,11 @@ from companion.viewer import wire
 QUEUE = 20
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.5, 10.0
 """Before a web process that has ended is started again."""
+HANGS_S = 10.0
+"""A process that takes nothing for so long is ended."""
 CLOSE_S = 1.5
 MOST_ACTIONS = 50
-NICE = 10
+NICE = 5
 """By so much the drive comes before the page, which others may keep busy."""
 NEEDED = ("starlette", "uvicorn", "websockets")
 TOKEN_BYTES = 16
@@ -189,7 +192,7 @@ class WebProcess:
             wait_s = FIRST_WAIT_S if stopwatch_s() - began_s > LONGEST_WAIT_S else min(2.0 * wait_s, LONGEST_WAIT_S)
 
     def _feed(self) -> None:
-        """One process, from its start to its end. Raises OSError when its pipe breaks."""
+        """One process, from its start to its end. Raises OSError when its pipe breaks, or nothing is taken from it."""
         descriptor = self._socket.fileno()
         command = [sys.executable, "-m", "companion.viewer.server", str(descriptor)]
         process = subprocess.Popen(
@@ -202,6 +205,7 @@ class WebProcess:
         hearing.start()
         try:
             assert process.stdin is not None
+            os.set_blocking(process.stdin.fileno(), False)
             self._write(process, wire.JSON, json.dumps(self._first()).encode())
             self._drain()
             self.begins_anew.set()
@@ -229,9 +233,15 @@ class WebProcess:
         }  # fmt: skip
 
     def _write(self, process: subprocess.Popen[bytes], kind: bytes, payload: bytes) -> None:
+        """Raises OSError."""
         assert process.stdin is not None
-        process.stdin.write(wire.packed(kind, payload))
-        process.stdin.flush()
+        pipe, rest = process.stdin.fileno(), memoryview(wire.packed(kind, payload))
+        room = select.poll()
+        room.register(pipe, select.POLLOUT)
+        while rest:
+            if not room.poll(1000.0 * HANGS_S):
+                raise TimeoutError("the web process takes nothing")
+            rest = rest[os.write(pipe, rest) :]
 
     def _drain(self) -> None:
         """What was meant for the process before: the new one is told everything anew."""

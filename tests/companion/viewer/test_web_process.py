@@ -21,7 +21,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from companion.viewer import server, wire
+from companion.viewer import server, web_process, wire
 from companion.viewer.live_board import LiveBoard
 from companion.viewer.map_tiles import run_lengths
 from companion.viewer.server import ACTIONS_A_SECOND, MOST_SPECTATORS, WebApp, fullest
@@ -199,6 +199,20 @@ def test_a_process_that_stalls_costs_moments_and_no_time(web: WebProcess) -> Non
     began_s = time.monotonic()
     web.close()
     assert time.monotonic() - began_s < 5.0
+
+
+def test_a_process_that_hangs_is_ended_and_begun_anew(web: WebProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = web.process_id
+    assert first is not None
+    os.kill(first, signal.SIGSTOP)
+    monkeypatch.setattr(web_process, "HANGS_S", 0.1)
+    big = json.dumps({**frame(1.0), "path": [[0.0, 0.0]] * 20_000}).encode()
+    wait_until(lambda: web.put(wire.JSON, big) and web.started == 2)
+    monkeypatch.undo()
+    begin(web)
+    with looking(web) as client:
+        assert next_of(client, "scene")["mission"] == "yard"
+    assert web.process_id != first and not psutil.pid_exists(first)
 
 
 @contextmanager
