@@ -40,6 +40,15 @@ class EarlierTrack:
             if len(self._places) > MOST:
                 self._thin()
 
+    def extend(self, places: list[list[float]]) -> None:
+        """Further ``places`` of another one, which knew more."""
+        for place in places:
+            self._places.append(place)
+            if len(self._places) > MOST:
+                self._thin()
+        if places:
+            self._newest, self._starts = places[-1], False
+
     def _thin(self) -> None:
         """Every second place goes. Where it began a line, the next one does."""
         self._every *= 2

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
@@ -18,6 +18,7 @@ from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of, told
 from companion.viewer.map_tiles import TileWatch
+from companion.viewer.retelling import Receiver, Retelling, run_id
 from companion.viewer.steady_frame import SteadyFrame
 
 FRAME_S, TILES_S, SCENE_S = 0.19, 0.5, 2.0
@@ -27,34 +28,20 @@ NEWS_KEPT, TOUCHED_KEPT = 200, 50
 Json = dict[str, Any]
 
 
-class Receiver(Protocol):
-    """Takes messages without waiting: ``WebProcess``, or what stands in for it."""
-
-    begins_anew: Any
-
-    @property
-    def is_full(self) -> bool:
-        """Whether nothing more can be taken now."""
-        ...
-
-    def put(self, kind: bytes, payload: bytes) -> bool:
-        """One more message; False if it was not taken."""
-        ...
-
-
 class ViewerFeed:
     """``always``: keys and values that each scene has, such as versions and settings."""
 
     def __init__(self, companion: Companion, receiver: Receiver, always: Json) -> None:
         self._companion = companion
         self._receiver = receiver
-        self._always = always
+        self._always = {"run": run_id(), **always}
         self._watch: TileWatch | None = None
         self._evidence: object = None
         self._epoch = 0
         self._scene: Json = {}
         self._frame_s = self._tiles_s = self._scene_s = -math.inf
         self._news: list[Json] = []
+        self._retelling = Retelling(receiver)
         self._rates = Arrivals()
         self.steady = SteadyFrame()
         self.touched: Sequence[Sequence[float]] | None = None
@@ -62,34 +49,39 @@ class ViewerFeed:
 
     def warn(self, text: str) -> None:
         """Something bad that the companion does not know of."""
-        self._news.append(told(self._companion.status().time_s, "error", text))
+        self._note([told(self._companion.status().time_s, "error", text)])
 
     def show(self, status: Status) -> None:
         """To be called after each tick."""
-        self._news = [*self._news, *news_of(status)][-NEWS_KEPT:]
+        self._note(news_of(status))
         self._rates.note(self._companion.vehicle)
-        now_s = stopwatch_s()
-        if now_s - self._frame_s < FRAME_S and not self._companion.done:
-            return
-        if self._receiver.begins_anew.is_set():
-            self._receiver.begins_anew.clear()
-            self._scene, self._scene_s = {}, -math.inf
+        if self._retelling.begins():
+            self._news, self._scene, self._scene_s = [], {}, -math.inf
             if self._watch is not None:
                 self._watch.tell_again()
-        if self._receiver.is_full:
+        knows_all, now_s = self._retelling.tell(), stopwatch_s()
+        if now_s - self._frame_s < FRAME_S and not self._companion.done:
             return
-        self._frame_s = now_s
-        executor = self._companion.executor
-        self.steady.note(None if executor is None else executor.layout.origin)
+        self._frame_s, frame = now_s, self._frame(status)
+        self._retelling.past.take(frame)
+        if self._receiver.is_full or not (knows_all or self._companion.done):
+            return
         self._tell_scene(now_s)
         self._tell_tiles(status, now_s)
-        self._tell_frame(status)
+        if self._put({**frame, "news": self._news}):
+            self._news = []
+
+    def _note(self, news: list[Json]) -> None:
+        """More news: to be told, and to be kept."""
+        self._news = [*self._news, *news][-NEWS_KEPT:]
+        self._retelling.past.news.extend(news)
 
     def end(self, line: str) -> None:
         """The last moment, of a run that ended otherwise than by itself. ``line``: how."""
         status = self._companion.status()
         frame = self._frame(status)
-        if frame["state"] != "ended" and self._put({**frame, "state": "ended", "line": line, "why": ""}):
+        last = {**frame, "news": self._news, "state": "ended", "line": line, "why": ""}
+        if frame["state"] != "ended" and self._put(last):
             self._news = []
 
     def _tell_scene(self, now_s: float) -> None:
@@ -127,13 +119,10 @@ class ViewerFeed:
         if news and not self._receiver.put(wire.TILES, wire.tile_message(news)):
             self._watch.tell_again(place for place, _ in news)
 
-    def _tell_frame(self, status: Status) -> None:
-        if self._put(self._frame(status)):
-            self._news = []
-
     def _frame(self, status: Status) -> Json:
+        executor = self._companion.executor
+        self.steady.note(None if executor is None else executor.layout.origin)
         frame = self.steady.frame(frame_of(self._companion, status))
-        frame["news"] = self._news
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
         frame["contacts"] = None if self.touched is None else len(self.touched)
         frame["touched"] = list((self.touched or ())[-TOUCHED_KEPT:])

@@ -12,18 +12,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from companion.viewer.earlier_track import EarlierTrack
+from companion.viewer.past import Past
 from companion.viewer.wire import Place, tile_message, tiles_in
 
-PAST_S = 600.0
-EVERY_S = 1.0
-"""One frame a second is kept for those who come later, for so long; of what was before only the track."""
 BACK_S = 1.0
 """A clock that goes back by more than this is another run's."""
-NEWS_KEPT = 500
 TILES_AT_ONCE = 200
-KEPT_OF_PAST = ("kind", "t", "pose", "speed", "state", "figures", "statuses")
-RUN_KEYS = ("map_epoch", "began_unix_s", "map")
+RUN_KEYS = ("run", "map_epoch", "began_unix_s", "map")
 """Where one of these differs in a scene, a page forgets the map, and mostly everything that it has heard before."""
 
 Json = dict[str, Any]
@@ -64,7 +59,7 @@ class Spectator:
             told.append(json.dumps({**board.scene, **acts}))
             if self._past:
                 self._past = False
-                told.append(json.dumps(board.past_message))
+                told.append(json.dumps(board.past.message))
                 self._news = board.news_count
         told += [json.dumps(self._answers.popleft()) for _ in range(len(self._answers))]
         out: list[str | bytes] = [*told]
@@ -87,11 +82,9 @@ class LiveBoard:
         self.frame: Json | None = None
         self.frame_count = 0
         self.tiles: dict[Place, bytes] = {}
-        self.past: deque[Json] = deque(maxlen=round(PAST_S / EVERY_S))
-        self.earlier = EarlierTrack()
+        self.past = Past()
+        """What a browser that comes now has missed."""
         self.news_count = 0
-        self._news: deque[Json] = deque(maxlen=NEWS_KEPT)
-        self._past_s = -EVERY_S
         self._spectators: set[Spectator] = set()
 
     def __len__(self) -> int:
@@ -110,21 +103,12 @@ class LiveBoard:
 
     def news_since(self, count: int) -> list[Json]:
         """The news after the first ``count``, as far as they are kept."""
-        missed = min(self.news_count - count, len(self._news))
-        return list(self._news)[len(self._news) - missed :] if missed > 0 else []
-
-    @property
-    def past_message(self) -> Json:
-        """What a browser that comes now has missed: the track, the news, and one frame a second of the last while."""
-        return {
-            "kind": "past",
-            "track": self.earlier.places,
-            "news": list(self._news),
-            "frames": list(self.past),
-        }
+        kept = self.past.news
+        missed = min(self.news_count - count, len(kept))
+        return list(kept)[len(kept) - missed :] if missed > 0 else []
 
     def take(self, message: Json) -> None:
-        """A scene or a frame of the run."""
+        """A scene, a frame or a piece of the past of the run."""
         if message["kind"] == "scene":
             anew = self.scene is None or any(self.scene.get(key) != message.get(key) for key in RUN_KEYS)
             if anew and self.scene is not None:
@@ -135,6 +119,8 @@ class LiveBoard:
                     spectator.begin()
                 else:
                     spectator.tell_scene()
+        elif message["kind"] == "past":
+            self._take_past(message)
         else:
             self._take_frame(message)
         self._wake()
@@ -148,19 +134,19 @@ class LiveBoard:
         self._wake()
 
     def _take_frame(self, frame: Json) -> None:
-        if frame["t"] < self._past_s - BACK_S:  # a page forgets what was before, too
-            self.past.clear()
-            self._news.clear()
-            self.earlier = EarlierTrack()
+        if frame["t"] < self.past.newest_s - BACK_S:  # a page forgets what was before, too
+            self.past = Past()
         self.frame, self.frame_count = frame, self.frame_count + 1
-        news = frame["news"]
-        self._news.extend(news)
-        self.news_count += len(news)
-        if not 0.0 <= frame["t"] - self._past_s < EVERY_S:
-            self._past_s = frame["t"]
-            if len(self.past) == self.past.maxlen:
-                self.earlier.add(self.past[0])
-            self.past.append({key: frame[key] for key in KEPT_OF_PAST})
+        self.past.news.extend(frame["news"])
+        self.news_count += len(frame["news"])
+        self.past.take(frame)
+
+    def _take_past(self, piece: Json) -> None:
+        """Of before this process: nobody is told of it until the scene has come, too."""
+        if piece["anew"]:  # what came in time from the process before is told again
+            self.scene, self.frame, self.past = None, None, Past()
+        self.past.join(piece)
+        self.news_count += len(piece["news"])
 
     def _wake(self) -> None:
         for spectator in self._spectators:

@@ -97,8 +97,13 @@ class LiveViewer:
 
     def end(self, line: str) -> None:
         """Tell how a run ended that did not end by itself."""
-        if self._feed is not None:
+        if self._feed is None:
+            return
+        try:
             self._feed.end(line)
+        except Exception as error:  # record and report have still to be closed
+            self._feed = None
+            self._say(f"the page is not told how the run ended: {type(error).__name__}: {error}")
 
     def close(self) -> None:
         """Tell the last moment, and end."""

@@ -70,7 +70,7 @@ class Film:
 
     def pictures(self) -> Iterator[Image.Image]:
         """A picture for each moment. To be asked for once."""
-        begins_s = self._data["maps"][-1][0]  # pictures have the map that was the last one
+        begins_s = max((t for t, _ in self._data.get("maps", ())), default=0.0)  # pictures have the last map
         tiles = deque(one for one in self._data["tiles"] if one[0] >= begins_s)
         for frame in self.moments():
             while tiles and tiles[0][0] <= frame["t"]:

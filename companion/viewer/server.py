@@ -46,10 +46,14 @@ MOST_NAME = 200
 HELLO_S, SEND_S = 10.0, 20.0
 ACTIONS_A_SECOND = 5
 WRONG_TOKEN_S = 0.5
+BEAT_S, BEAT = 2.0, json.dumps({"kind": "beat"})
+"""After so long without a word a browser is told that somebody is there: nothing else ends a half-open connection."""
 MOST_UNSENT, LOOK_S = 16_000_000, 0.2
 """Bytes that browsers have not taken yet, of all together; they are looked at so often."""
 SILENT_S = 5.0
 """After so long a connection without a request is ended: nobody may take all of them."""
+MOST_WAITING = 20
+"""Messages of the run that have been read but not taken."""
 LAST_S = 0.4
 """So long browsers have to be told the last moment."""
 LONGEST_S = 1e9
@@ -150,7 +154,10 @@ class WebApp:
 
     async def _tell(self, socket: WebSocket, spectator: Spectator, news: asyncio.Event) -> None:
         while True:
-            await news.wait()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(news.wait(), BEAT_S)
+            if not news.is_set():
+                await asyncio.wait_for(socket.send_text(BEAT), SEND_S)
             news.clear()
             while messages := spectator.messages():
                 for message in messages:
@@ -162,13 +169,14 @@ class WebApp:
         while True:
             asked = _message(await socket.receive_text())
             now_s = asyncio.get_running_loop().time()
-            flood = now_s - times_s[0] < 1.0
+            early_s = times_s[0] + 1.0 - now_s
             times_s.append(now_s)
-            fault = "too many requests" if flood else self._fault(asked, spectator)
+            fault = "too many requests" if early_s > 0.0 else self._fault(asked, spectator)
             if fault:
                 spectator.answer(
                     {"kind": "answer", "action": str(asked.get("action"))[:20], "ok": False, "text": fault}
                 )
+                await asyncio.sleep(early_s)  # nothing more is read meanwhile, so that the network holds it up
                 continue
             self._asked += 1
             self._asks[self._asked] = spectator
@@ -293,8 +301,10 @@ def fullest(transports: list[Any], most: int) -> list[Any]:
 
 def _listen(app: WebApp, server: uvicorn.Server, loop: asyncio.AbstractEventLoop) -> None:
     """In a thread: what the run says, to the end."""
+    room = threading.Semaphore(MOST_WAITING)
 
     def take(kind: bytes, payload: bytes) -> None:
+        room.release()
         if kind == wire.TILES:
             app.board.take_tiles(payload)
             return
@@ -306,6 +316,7 @@ def _listen(app: WebApp, server: uvicorn.Server, loop: asyncio.AbstractEventLoop
 
     with contextlib.suppress(ValueError, OSError, RuntimeError):
         while (message := wire.read_message(sys.stdin.buffer)) is not None:
+            room.acquire()  # a server that hangs takes nothing any more: that is noticed at the other end
             loop.call_soon_threadsafe(take, *message)
     with contextlib.suppress(RuntimeError):  # once everybody has been told the last moment
         loop.call_soon_threadsafe(loop.call_later, LAST_S, setattr, server, "should_exit", True)

@@ -1,7 +1,7 @@
 """The web process as the run sees it: started beside the drive, fed without ever waiting for it, started again.
 
-A thread writes to its pipe. If the process stalls, the queue fills and moments are left out; if it ends, another one is
-started and told everything anew. The drive notices neither.
+A thread writes to its pipe. If the process stalls, the queue fills and moments are left out; if it ends, or takes
+nothing for long, another one is started and told everything anew. The drive notices neither.
 
 Nouns: web process.
 """
@@ -11,8 +11,10 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import json
+import os
 import queue
 import secrets
+import select
 import socket
 import stat
 import subprocess
@@ -31,8 +33,12 @@ from companion.viewer import wire
 QUEUE = 20
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.5, 10.0
 """Before a web process that has ended is started again."""
+HANGS_S = 10.0
+"""A process that takes nothing for so long is ended."""
 CLOSE_S = 1.5
 MOST_ACTIONS = 50
+NICE = 5
+"""By so much the drive comes before the page, which others may keep busy."""
 NEEDED = ("starlette", "uvicorn", "websockets")
 TOKEN_BYTES = 16
 LEAST_TOKEN, MOST_TOKEN_BYTES = 8, 1000
@@ -186,18 +192,20 @@ class WebProcess:
             wait_s = FIRST_WAIT_S if stopwatch_s() - began_s > LONGEST_WAIT_S else min(2.0 * wait_s, LONGEST_WAIT_S)
 
     def _feed(self) -> None:
-        """One process, from its start to its end. Raises OSError when its pipe breaks."""
+        """One process, from its start to its end. Raises OSError when its pipe breaks, or nothing is taken from it."""
         descriptor = self._socket.fileno()
         command = [sys.executable, "-m", "companion.viewer.server", str(descriptor)]
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, pass_fds=(descriptor,),
             start_new_session=True,
         )  # fmt: skip
+        _yield(process.pid)
         self._process, self.started = process, self.started + 1
         hearing = threading.Thread(target=self._hear, args=(process,), name="web requests", daemon=True)
         hearing.start()
         try:
             assert process.stdin is not None
+            os.set_blocking(process.stdin.fileno(), False)
             self._write(process, wire.JSON, json.dumps(self._first()).encode())
             self._drain()
             self.begins_anew.set()
@@ -225,9 +233,15 @@ class WebProcess:
         }  # fmt: skip
 
     def _write(self, process: subprocess.Popen[bytes], kind: bytes, payload: bytes) -> None:
+        """Raises OSError."""
         assert process.stdin is not None
-        process.stdin.write(wire.packed(kind, payload))
-        process.stdin.flush()
+        pipe, rest = process.stdin.fileno(), memoryview(wire.packed(kind, payload))
+        room = select.poll()
+        room.register(pipe, select.POLLOUT)
+        while rest:
+            if not room.poll(1000.0 * HANGS_S):
+                raise TimeoutError("the web process takes nothing")
+            rest = rest[os.write(pipe, rest) :]
 
     def _drain(self) -> None:
         """What was meant for the process before: the new one is told everything anew."""
@@ -245,6 +259,14 @@ class WebProcess:
                 asked = json.loads(line)
                 if isinstance(asked, dict):
                     self._asked.append(asked)
+
+
+def _yield(process_id: int) -> None:
+    """Let this process come after the drive, as far as the system has it."""
+    with contextlib.suppress(OSError):
+        os.setpriority(os.PRIO_PROCESS, process_id, os.getpriority(os.PRIO_PROCESS, 0) + NICE)
+    with contextlib.suppress(OSError):  # where sessions share the processor, a session's own value counts
+        Path(f"/proc/{process_id}/autogroup").write_text(f"{NICE}\n", encoding="ascii")
 
 
 def _listening(place: WebPlace) -> socket.socket:

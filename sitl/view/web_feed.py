@@ -13,8 +13,9 @@ from collections.abc import Callable
 from typing import Any
 
 from companion.viewer import wire
-from companion.viewer.feed import FRAME_S, NEWS_KEPT, SCENE_S, Receiver
+from companion.viewer.feed import FRAME_S, NEWS_KEPT, SCENE_S
 from companion.viewer.frame import told
+from companion.viewer.retelling import Receiver, Retelling, run_id
 from sitl.simulator import Simulator
 from sitl.view.true_frame import frame_of, scene_of
 from sitl.view.true_map import TrueMap
@@ -42,6 +43,8 @@ class WebFeed:
         self._scene: Json = {}
         self._frame_s = self._scene_s = -math.inf
         self._news: list[Json] = []
+        self._retelling = Retelling(receiver)
+        self._run = run_id()
         self._rates = Rates()
         self._heard: dict[str, tuple[int, float]] = {}
         """Packets heard on each link, and when the last came."""
@@ -49,7 +52,9 @@ class WebFeed:
 
     def tell(self, line: str, level: str = "info") -> None:
         """One more of the news."""
-        self._news = [*self._news, told(self._simulator.time_s, level, line)][-NEWS_KEPT:]
+        one = told(self._simulator.time_s, level, line)
+        self._news = [*self._news, one][-NEWS_KEPT:]
+        self._retelling.past.news.append(one)
 
     def show(self, now_s: float) -> None:
         """To be called in each round. ``now_s``: real seconds."""
@@ -65,24 +70,26 @@ class WebFeed:
         was, self._was = self._was, AutopilotState(self._simulator)
         for line in self._was.events_since(was):
             self.tell(line, "warning" if self._was.is_off else "notice")
+        if self._retelling.begins():
+            self._news, self._scene, self._scene_s = [], {}, -math.inf
+            self._map.tell_again()
+        knows_all = self._retelling.tell()
         if now_s - self._frame_s < FRAME_S:
             return
-        if self._receiver.begins_anew.is_set():
-            self._receiver.begins_anew.clear()
-            self._scene, self._scene_s = {}, -math.inf
-            self._map.tell_again()
-        if self._receiver.is_full:
+        self._frame_s, frame = now_s, self._frame(now_s)
+        self._retelling.past.take(frame)
+        if self._receiver.is_full or not knows_all:
             return
-        self._frame_s = now_s
         self._tell_scene(now_s)
         self._tell_map()
-        self._tell_frame(now_s)
+        if self._put({**frame, "news": self._news}):
+            self._news = []
 
     def _tell_scene(self, now_s: float) -> None:
         if now_s - self._scene_s < SCENE_S:
             return
         self._scene_s = now_s
-        scene = scene_of(self._simulator, self._name)
+        scene = {**scene_of(self._simulator, self._name), "run": self._run}
         if scene != self._scene and self._put(scene):
             self._scene = scene
 
@@ -94,14 +101,12 @@ class WebFeed:
         if tiles and not self._receiver.put(wire.TILES, wire.tile_message(tiles)):
             self._map.put_back(tiles)
 
-    def _tell_frame(self, now_s: float) -> None:
+    def _frame(self, now_s: float) -> Json:
         simulator = self._simulator
         rates = self._rates.update(
             simulator.time_s, {link.name: (link.heard.packets, link.sent.packets) for link in simulator.links}
         )
-        frame = frame_of(simulator, self._connected(now_s), rates, self._how)
-        if self._put({**frame, "news": self._news}):
-            self._news = []
+        return frame_of(simulator, self._connected(now_s), rates, self._how)
 
     def _connected(self, now_s: float) -> list[str]:
         """Links on which somebody has been heard lately."""

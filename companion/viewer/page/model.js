@@ -6,6 +6,8 @@ import { split, TileMap } from "viewer/tiles.js";
 import { Track } from "viewer/track.js";
 
 const NEWS_KEPT = 500;
+/** Where one of these differs in a scene, it is another run, or another map. */
+const RUN_KEYS = ["run", "map_epoch", "began_unix_s"];
 /** A clock that goes back by more than this is another run's. */
 const BACK_S = 1;
 /** After a gap as long as this, what lay between is not known: the track must not cross it as a straight line. */
@@ -58,7 +60,7 @@ export class Model {
 
   takeScene(scene) {
     const before = this.scene;
-    const another = before && (before.map_epoch !== scene.map_epoch || before.began_unix_s !== scene.began_unix_s);
+    const another = before && RUN_KEYS.some((key) => before[key] !== scene[key]);
     const shapeChanged = JSON.stringify(before?.map ?? null) !== JSON.stringify(scene.map ?? null);
     if (another) this.forget();
     if (another || shapeChanged || this.mapIsOld) this.map = new TileMap(scene.map ?? null);

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,7 @@ def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_
         if 49.0 < status.time_s < 49.25:
             heard.scenes.clear()
             heard.tiles.clear()
+            heard.frames.clear()
             heard.begins_anew.set()
             watched.warn("collision 1")
             watched.touched = [(1.0, 2.0)]
@@ -120,9 +122,15 @@ def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_
 
     run.run(look, 0.2)
     said = [one["text"] for frame in heard.frames for one in frame["news"]]
-    assert any(text.startswith("Companion:") for text in said), "it was said before anybody listened"
+    assert any(text.startswith("Companion:") for text in said), "it was said to the process before"
+    assert said.count("Heading for far end") == 1
+    tracked_s = [one["t"] for told in heard.frames if told["kind"] == "past" for one in told["frames"]]
+    assert tracked_s[0] < 1.0 and max(later - one for one, later in pairwise(tracked_s)) < 1.5
     assert "collision 1" in said and (heard.frames[-1]["contacts"], heard.frames[-1]["touched"]) == (
         1,
         [[1.0, 2.0]],
     )
     assert len(heard.scenes) >= 1 and len(heard.tiles) > 3
+    again = Heard()
+    ViewerFeed(run.companion, again, {}).show(run.take_status())
+    assert again.scenes[0]["run"] != heard.scenes[0]["run"] and len({one["run"] for one in heard.scenes}) == 1

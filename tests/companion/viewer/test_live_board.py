@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from companion.viewer.earlier_track import MOST
-from companion.viewer.live_board import NEWS_KEPT, PAST_S, TILES_AT_ONCE, LiveBoard, Spectator
+from companion.viewer.live_board import TILES_AT_ONCE, LiveBoard, Spectator
 from companion.viewer.map_tiles import run_lengths
+from companion.viewer.past import NEWS_KEPT, PAST_S
 from companion.viewer.wire import tile_message, tiles_in
 
 RUNS = run_lengths(np.ones((64, 64), np.uint8))
@@ -97,6 +98,15 @@ def test_another_map_begins_with_its_scene() -> None:
     assert texts[0]["map_epoch"] == 2 and places == [(7, 7)]
 
 
+def test_another_run_is_told_from_its_beginning() -> None:
+    live = board()
+    spectator = live.join(False, lambda: None)
+    live.take(frame(0.0, "one"))
+    heard(spectator)
+    live.take({**SCENE, "run": "another"})
+    assert [text["kind"] for text in heard(spectator)[0]][:2] == ["scene", "past"]
+
+
 def test_who_comes_after_hours_is_told_the_whole_track() -> None:
     live = board()
     for second in range(20_000):
@@ -135,7 +145,7 @@ def test_nothing_grows_without_bound() -> None:
     spectator = live.join(False, lambda: None)
     for step in range(5000):
         live.take(frame(0.5 * step, "text"))
-    assert len(live.past) == PAST_S and len(live.news_since(0)) == NEWS_KEPT
+    assert len(live.past.frames) == PAST_S and len(live.news_since(0)) == NEWS_KEPT
     for _ in range(100):
         spectator.answer({"kind": "answer"})
     texts, _ = heard(spectator)

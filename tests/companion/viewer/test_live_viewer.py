@@ -27,6 +27,19 @@ def test_a_fault_of_the_picture_is_told_once_and_the_drive_goes_on(time_s: float
     assert len(told) == 1 and told[0].startswith("the page has no more news, the drive goes on: ")
 
 
+def test_a_fault_at_the_end_is_told_and_keeps_nothing_from_being_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    viewer, run = LiveViewer(WebPlace("127.0.0.1", 0), told.append), new_drive("points")
+    try:
+        viewer.follow(run.companion, run.settings, simulated=True)
+        monkeypatch.setattr(run.companion, "status", lambda: 1 / 0)
+        viewer.end("stopped by the user")
+        viewer.end("stopped by the user")
+    finally:
+        viewer.close()
+    assert told == ["the page is not told how the run ended: ZeroDivisionError: division by zero"]
+
+
 def test_only_a_person_is_told_the_token_with_the_address(tmp_path) -> None:
     viewer = web_viewer("0", tmp_path / "token", print)
     assert viewer is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import os
@@ -20,9 +21,10 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from companion.viewer import wire
+from companion.viewer import server, web_process, wire
+from companion.viewer.live_board import LiveBoard
 from companion.viewer.map_tiles import run_lengths
-from companion.viewer.server import MOST_SPECTATORS, fullest
+from companion.viewer.server import ACTIONS_A_SECOND, MOST_SPECTATORS, WebApp, fullest
 from companion.viewer.web_process import WebError, WebPlace, WebProcess, web_place
 from tests.companion.viewer.test_live_board import SCENE, frame
 
@@ -199,6 +201,20 @@ def test_a_process_that_stalls_costs_moments_and_no_time(web: WebProcess) -> Non
     assert time.monotonic() - began_s < 5.0
 
 
+def test_a_process_that_hangs_is_ended_and_begun_anew(web: WebProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = web.process_id
+    assert first is not None
+    os.kill(first, signal.SIGSTOP)
+    monkeypatch.setattr(web_process, "HANGS_S", 0.1)
+    big = json.dumps({**frame(1.0), "path": [[0.0, 0.0]] * 20_000}).encode()
+    wait_until(lambda: web.put(wire.JSON, big) and web.started == 2)
+    monkeypatch.undo()
+    begin(web)
+    with looking(web) as client:
+        assert next_of(client, "scene")["mission"] == "yard"
+    assert web.process_id != first and not psutil.pid_exists(first)
+
+
 @contextmanager
 def unread(port: int) -> Iterator[socket.socket]:
     """A browser that has said hello and reads nothing any more."""
@@ -329,3 +345,72 @@ def test_more_than_may_look_on_at_once_are_told_so(web: WebProcess) -> None:
             except ConnectionClosed as closed:
                 turned_away += closed.rcvd is not None and closed.rcvd.code == 1013
         assert turned_away == 6
+
+
+class Browser:
+    """Stands in for a websocket: says what it is given, then nothing; hears everything at once."""
+
+    def __init__(self, *says: str) -> None:
+        self.headers = {"host": "127.0.0.1"}
+        self.says = list(says)
+        self.heard: list[str] = []
+
+    async def accept(self) -> None:
+        pass
+
+    async def close(self, code: int = 1000) -> None:
+        pass
+
+    async def receive_text(self) -> str:
+        if not self.says:
+            await asyncio.sleep(WAIT_S)
+        return self.says.pop(0)
+
+    async def send_text(self, text: str) -> None:
+        self.heard.append(text)
+
+
+def served_for(seconds: float, app: WebApp, *browsers: Browser) -> None:
+    async def serve() -> None:
+        tasks = [asyncio.create_task(app.socket(one)) for one in browsers]
+        await asyncio.sleep(seconds)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    asyncio.run(serve())
+
+
+def test_a_browser_hears_something_though_there_is_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "BEAT_S", 0.02)
+    browser = Browser('{"kind":"hello"}')
+    served_for(0.3, WebApp(LiveBoard(False), "127.0.0.1", "", False), browser)
+    assert 2 <= len(browser.heard) <= 20 and set(browser.heard) == {'{"kind": "beat"}'}
+
+
+def test_who_asks_too_fast_is_not_read_further_until_its_time() -> None:
+    browser = Browser('{"kind":"hello"}', *["[]"] * 1000)
+    served_for(0.3, WebApp(LiveBoard(False), "127.0.0.1", "", False), browser)
+    told = [json.loads(one)["text"] for one in browser.heard]
+    assert told == ["not allowed"] * ACTIONS_A_SECOND + ["too many requests"] and len(browser.says) > 900
+
+
+def test_one_who_floods_is_held_up_and_others_get_their_frames(web: WebProcess) -> None:
+    garbage = (bytes([0x81, 0x80 | 2]) + bytes(4) + b"[]") * 10_000
+    with unread(web.place.port) as flood, looking(web) as client:
+        next_of(client, "scene")
+        flood.settimeout(0.3)
+        with pytest.raises(TimeoutError):
+            for _ in range(1000):
+                flood.sendall(garbage)
+        used_s = sum(psutil.Process(web.process_id).cpu_times()[:2])
+        for step in range(10):
+            message = json.dumps(frame(0.2 * step)).encode()
+            wait_until(lambda told=message: web.put(wire.JSON, told))
+            time.sleep(0.04)
+        assert newest(client, 0.2 * 9) == pytest.approx(0.2 * 9)
+        assert sum(psutil.Process(web.process_id).cpu_times()[:2]) - used_s < 0.12
+
+
+def test_the_page_comes_after_the_drive(web: WebProcess) -> None:
+    assert psutil.Process(web.process_id).nice() > psutil.Process().nice()
