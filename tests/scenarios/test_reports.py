@@ -25,9 +25,11 @@ from companion.recording.reader import load_record
 from companion.replay.replay import replay
 from companion.viewer import map_tiles, report_mcap
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
+from companion.viewer.report_csv import FILES
 from companion.viewer.report_data import ReportWatch, counted
 from companion.viewer.report_tables import tables_of
 from companion.viewer.wire import tiles_in
+from tests.support.full_disk import full_after
 from tests.support.records import START_US, recorded, write_record
 from tests.support.reports import report_data_in
 from tests.support.rig import yard
@@ -343,3 +345,21 @@ def test_what_cannot_be_written_is_one_line_and_no_record_is_harmed(
     assert (result.exit_code, result.output.count("\n")) == (2, 1) and says in result.output
     assert {file: file.read_bytes() for file in record.rglob("*") if file.is_file()} == before
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("option", "place"), [("--out", "r.html"), ("--gif", "r.gif"), ("--mcap", "r.mcap"), ("--csv", "csv")]
+)
+def test_a_full_disk_leaves_what_was_there_and_nothing_cut(
+    record: Path, tmp_path: Path, option: str, place: str
+) -> None:
+    old = [tmp_path / "csv" / name for name in FILES] if option == "--csv" else [tmp_path / place]
+    for file in old:
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("old")
+    with full_after(1000):
+        result = CliRunner().invoke(app, ["report", str(record), option, str(tmp_path / place)])
+    says = f"{tmp_path / place}: cannot be written: File too large; choose another place"
+    assert (result.exit_code, result.output.splitlines()) == (2, [says])
+    assert sorted(file for file in tmp_path.rglob("*") if file.is_file()) == sorted(old)
+    assert {file.read_text() for file in old} == {"old"}
