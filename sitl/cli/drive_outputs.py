@@ -104,8 +104,7 @@ class Outputs:
             return ""
         if recorder.problem:
             return recorder.problem  # a record that ends early does not change the result of the run
-        run.companion.save_map(recorder.directory / "map")
-        write_collisions(run, recorder)
+        complete_record(run, recorder)
         return "" if self.record is None else f"record:  {recorder.directory}"
 
     def _write_report(self, recorder: Recorder | NullRecorder, console: Console, run: Drive) -> str:
@@ -137,8 +136,14 @@ def _contacts_text(report: Report) -> str:
     return "\n".join(lines)
 
 
-def write_collisions(run: Drive, recorder: Recorder) -> None:
-    """The file of a record that lists all contacts, if there are any. Raises OutputError."""
+def complete_record(run: Drive, recorder: Recorder) -> None:
+    """The files of a record that are written at its end. Raises OutputError or MapError."""
+    _write_collisions(run, recorder)
+    run.companion.save_map(recorder.directory / "map")
+
+
+def _write_collisions(run: Drive, recorder: Recorder) -> None:
+    """All contacts, if there are any."""
     contacts = run.contacts
     if contacts:
         file = recorder.directory / "collisions.json"
