@@ -53,5 +53,5 @@ def test_the_last_picture_of_a_drive_stays_on_the_terminal_and_under_it_the_outc
         assert ended(drawn) == 0
     last = [line.strip() for line in drawn.last.decode().split("\r\n")]
     shown = last[-rows:]
-    assert any("outcome: reached, 1 of 1" in line for line in shown[-5:]) and "picture:" in " ".join(shown[-4:])
+    assert any("outcome: reached, 1 of 1" in line for line in shown[-6:]) and "picture:" in " ".join(shown[-4:])
     assert columns < 60 or any("✓ reached" in line for line in shown)
