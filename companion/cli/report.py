@@ -197,7 +197,9 @@ def _tell(what: str, file: Path) -> None:
 
 
 def _line(what: str, file: Path) -> str:
-    return f"{what}: {file} ({file.stat().st_size / 1e6:.1f} MB)"
+    size = file.stat().st_size
+    told = f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{max(size / 1e3, 1.0):.0f} kB"
+    return f"{what}: {file} ({told})"
 
 
 def _compare(runs: list[Run]) -> None:
