@@ -20,7 +20,7 @@ from companion.bench.movingai import ScenarioFileError
 from companion.bench.page import write_page
 from companion.bench.peers import installed_peers
 from companion.bench.report import as_json, head, rows, runs_explained
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, replaced, usable_settings, writable, written
 from companion.cli.plan import PlaceError, place_of
 from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
@@ -92,9 +92,9 @@ def bench(
     )
     try:
         if json_file is not None:
-            with written(json_file):
+            with replaced(json_file) as new:
                 figures = as_json(entries, cases, limits, settings)
-                json_file.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+                new.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
         if docs is not None:
             with written(docs):
                 files = write_page(docs, command, entries, contestants, cases, limits)

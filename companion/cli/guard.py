@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, replaced, usable_settings, writable
 from companion.core.clock import WallClock
 from companion.mavlink.file_upload import FileUpload, UploadEnd
 from companion.mavlink.transport import LinkError, open_link
@@ -53,8 +53,8 @@ def guard(
 def _write(place: Path, text: str) -> None:
     place = place / FILE if place.is_dir() else place
     writable(place)
-    with written(place):
-        place.write_text(text, encoding="utf-8")
+    with replaced(place) as new:
+        new.write_text(text, encoding="utf-8")
     typer.echo(f"wrote {place}; copy it to the folder APM/scripts of the autopilot's SD card; {WHAT_NEXT}")
 
 

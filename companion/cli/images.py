@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.cli.inputs import written
+from companion.cli.inputs import replaced
 from companion.control.motion_controller import MotionChoice
 from companion.control.motion_kernels import BLOCKED_S, MotionGround, MotionProblem, way_of
 from companion.core.frames import NedPoint
@@ -49,8 +49,8 @@ def save_plan(
         _dots(figure, grid.places_of(end), colour)
     if len(tight):
         _rings(figure, grid.places_of(tight), f"bends more sharply than the rover turns ({len(tight)})")
-    with written(file):
-        figure.save(file, title)
+    with replaced(file) as new:
+        figure.save(new, title)
 
 
 UNSEEN_TINT = np.array([0.86, 0.9, 1.0])
@@ -94,8 +94,8 @@ def save_decision(file: Path, why: Explanation) -> None:
         figure.key(_rgb(colour), f"{candidate.name}: {cost_text(candidate)}; {candidate.note}")
     _dots(figure, target, TARGET_COLOUR)
     _rover(figure, why)
-    with written(file):
-        figure.save(file, f"decision {why.number} at {why.time_s:.2f} s, heading for {why.target}")
+    with replaced(file) as new:
+        figure.save(new, f"decision {why.number} at {why.time_s:.2f} s, heading for {why.target}")
 
 
 MOTIONS_M = 6.0
@@ -134,8 +134,8 @@ def save_motions(file: Path, choice: MotionChoice, title: str) -> None:
     for colour, label in ((START_COLOUR, "rover"), (OBSTACLE_COLOUR, "obstacle")):
         figure.key(_rgb(colour), label)
     figure.key(_rgb(UNSEEN_COLOUR), "not seen yet, or off the ground looked at")
-    with written(file):
-        figure.save(file, f"{title}: {len(order)} motions of {problem.horizon_s:g} s")
+    with replaced(file) as new:
+        figure.save(new, f"{title}: {len(order)} motions of {problem.horizon_s:g} s")
 
 
 def _rgb(colour: Colour) -> tuple[float, float, float]:

@@ -14,7 +14,7 @@ from companion.core.own_parts import OwnPartError
 from companion.executive.controller_choice import check_controller
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import Settings, SettingsError, load_settings
-from companion.storage.files import refuse_pipe
+from companion.storage.files import beside, refuse_pipe, whole_file
 
 EXIT_BAD_INPUT = 2
 """Of every command: it has not begun, since a file or an option cannot be used."""
@@ -77,11 +77,12 @@ def writable(path: Path | None, suffix: str = "") -> None:
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         refuse_pipe(path)
-        existed = os.path.exists(path)  # Path.exists raises where a folder may not be entered
-        with path.open("ab"):
-            pass
-        if not existed:
-            path.unlink()
+        for file in dict.fromkeys(reversed(beside(path))):
+            existed = os.path.exists(file)  # Path.exists raises where a folder may not be entered
+            with file.open("ab"):
+                pass
+            if not existed:
+                file.unlink()
 
 
 def apart(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
@@ -105,3 +106,13 @@ def written(path: Path) -> Iterator[None]:
     except OSError as error:
         place = error.filename if os.path.isdir(path) and error.filename else path
         raise OutputError(f"{place}: cannot be written: {error.strerror or error}; choose another place") from error
+
+
+@contextlib.contextmanager
+def replaced(path: Path) -> Iterator[Path]:
+    """A context in which a file is written under the name that it gives; whole, it takes the place of ``path``.
+
+    After an error the old file is as it was; an OSError becomes OutputError.
+    """
+    with written(path), whole_file(path) as new:
+        yield new

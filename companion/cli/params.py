@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, replaced, usable_settings, writable
 from companion.cli.state import StateFiles
 from companion.core.clock import WallClock
 from companion.mavlink.parameter_reader import ParameterReader
@@ -81,8 +81,8 @@ def _write(place: Path, wanted: Sequence[WantedParameter], table: Sequence[Wante
     if form is None:
         raise OutputError(f"{place}: end its name in .param (Mission Planner, MAVProxy) or .params (QGroundControl)")
     writable(place)
-    with written(place):
-        place.write_text(text_of(wanted, table, form), encoding="utf-8")
+    with replaced(place) as new:
+        new.write_text(text_of(wanted, table, form), encoding="utf-8")
     typer.echo(f"wrote {place}: {len(wanted)} parameters; load it with a ground station, and restart the autopilot")
 
 

@@ -13,13 +13,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, replaced, writable, written
 from companion.cli.replay_progress import watched_replay
 from companion.mapping.map_files import MapError
 from companion.recording.reader import Record, files_of, load_record
 from companion.recording.record_clock import record_clock
 from companion.recording.record_format import RecordError
 from companion.replay.replay import ReplayObserver
+from companion.storage.files import whole_file
 from companion.viewer.report_csv import FILES, CsvReport
 from companion.viewer.report_data import ReportWatch, as_json, counted, joined, named, run_of
 from companion.viewer.report_film import Film, FilmError, check_ffmpeg, write_gif, write_mp4
@@ -135,12 +136,11 @@ def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
     with ExitStack() as stack:
         if forms.csv is not None:
             stack.enter_context(written(forms.csv))
-            tables = CsvReport(forms.csv, clock)
+            tables = CsvReport({name: stack.enter_context(whole_file(forms.csv / name)) for name in FILES}, clock)
             stack.callback(tables.close)
             observers.append(tables)
         if forms.mcap is not None:
-            stack.enter_context(written(forms.mcap))
-            messages = McapReport(forms.mcap, clock)
+            messages = McapReport(stack.enter_context(replaced(forms.mcap)), clock)
             stack.callback(messages.close)
             observers.append(messages)
         result = watched_replay(first, *observers)
@@ -157,12 +157,12 @@ def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
 def _write(record: Record, data: dict[str, Any], forms: Forms) -> None:
     """The forms that are made of the report's data."""
     if forms.gif is not None:
-        with written(forms.gif):
-            write_gif(Film(data), forms.gif)
+        with replaced(forms.gif) as new:
+            write_gif(Film(data), new)
         _tell("film", forms.gif)
     if forms.mp4 is not None:
-        with written(forms.mp4):
-            write_mp4(Film(data), forms.mp4)
+        with replaced(forms.mp4) as new:
+            write_mp4(Film(data), new)
         _tell("film", forms.mp4)
     if forms.page is not None:
         typer.echo(_page_written(record, data, forms.page))
@@ -187,8 +187,8 @@ def _refuse_silent(record: Record) -> None:
 
 
 def _page_written(record: Record, data: dict[str, Any], file: Path) -> str:
-    with written(file):
-        file.write_text(report_page(record.mission.name, as_json(data)), encoding="utf-8")
+    with replaced(file) as new:
+        new.write_text(report_page(record.mission.name, as_json(data)), encoding="utf-8")
     return _line("report", file)
 
 
@@ -197,7 +197,9 @@ def _tell(what: str, file: Path) -> None:
 
 
 def _line(what: str, file: Path) -> str:
-    return f"{what}: {file} ({file.stat().st_size / 1e6:.1f} MB)"
+    size = file.stat().st_size
+    told = f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{max(size / 1e3, 1.0):.0f} kB"
+    return f"{what}: {file} ({told})"
 
 
 def _compare(runs: list[Run]) -> None:

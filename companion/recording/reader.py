@@ -96,7 +96,9 @@ class Record:
                     cut = LIDARS
                 if cut:
                     after_s = entry.time_s - ticks[0].time_s
-                    self.notes.append(f"{self.directory / cut}: ends after {after_s:.2f} s ({number} ticks)")
+                    self.notes.append(
+                        f"{self.directory / cut}: ends after {after_s:.2f} s ({number} tick{'s' * (number != 1)})"
+                    )
                     return
                 yield RecordedTick(entry, packets[: entry.heard], packets[entry.heard :], sent)
 

@@ -54,7 +54,10 @@ class FileLength(BaseModel):
 
 
 class RecordMeta(BaseModel):
-    """``meta.json``. ``end``: by file name; None until the record is closed. ``lidars``: as they were given."""
+    """``meta.json``. ``end``: by file name; None until the record is closed. ``lidars``: as they were given.
+
+    ``stopped_by_user``: the run was broken off, and the companion had no time to end it.
+    """
 
     model_config = ConfigDict(extra="ignore")
 
@@ -70,6 +73,7 @@ class RecordMeta(BaseModel):
     versions: dict[str, str]
     inputs: list[InputFile]
     end: dict[str, FileLength] | None
+    stopped_by_user: bool = False
 
 
 class LidarEntry(NamedTuple):

@@ -97,7 +97,7 @@ class NullRecorder:
     def mark(self, mark: Mark) -> None:
         """Ignored."""
 
-    def close(self) -> None:
+    def close(self, *, stopped_by_user: bool = False) -> None:
         """Nothing to close."""
 
 
@@ -207,10 +207,14 @@ class Recorder:
         """One line of JSON."""
         self._write(DECISIONS, decision_line(time_s, target, decision).encode() + b"\n")
 
-    def close(self) -> None:
-        """Write what is left, and mark the record complete. Gives up on a disk that hangs. May be called again."""
+    def close(self, *, stopped_by_user: bool = False) -> None:
+        """Write what is left, and mark the record complete. Gives up on a disk that hangs. May be called again.
+
+        ``stopped_by_user``: the run was broken off before the companion could end it.
+        """
         if self._closed:
             return
+        self._meta.stopped_by_user = stopped_by_user
         self._end_tick()
         self._hand_over()
         self._closed = True

@@ -12,6 +12,7 @@ import contextlib
 import errno
 import os
 import stat
+from collections.abc import Iterator
 from io import BufferedReader
 from pathlib import Path
 from typing import Protocol
@@ -199,6 +200,39 @@ def replace_file(disk: Disk, path: Path, data: bytes) -> None:
 def write_whole(path: Path, data: bytes) -> None:
     """Replace a file that others may read too (see ``replace_file``). Raises OSError."""
     replace_file(OsDisk(SHARED), path, data)
+
+
+def beside(path: Path) -> tuple[Path, Path]:
+    """Where a file is written until it is whole, and where it then goes; both are the file itself if it is a device.
+
+    The suffix stays, since it decides the format of a picture. Of a symbolic link the file that it leads to is meant.
+    """
+    target = Path(os.path.realpath(path))
+    if os.path.exists(target) and not os.path.isfile(target):
+        return path, path  # with its own suffix
+    return target.with_name(f".{target.stem}{NEW_SUFFIX}{path.suffix}"), target
+
+
+@contextlib.contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A context that gives a name to write to; what is there in the end takes the place of ``path`` in one step.
+
+    After an error the old file is as it was, and nothing of the new one is left. Raises OSError.
+    """
+    new, target = beside(path)
+    if new == target:
+        yield path
+        return
+    new.unlink(missing_ok=True)  # of a program that was killed
+    try:
+        yield new
+        with new.open("rb") as file:
+            os.fsync(file.fileno())  # some disks say only now that they are full
+        os.replace(new, target)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            new.unlink(missing_ok=True)
+        raise
 
 
 def set_aside(path: Path, word: str) -> Path:

@@ -9,6 +9,8 @@ import base64
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -96,7 +98,7 @@ class FilmPicture:
         shape = (section.y1 - section.y0, section.x1 - section.x0)
         self._cells: NDArray[np.uint8] = np.full(shape, UNKNOWN, np.uint8)
         self._ground: Image.Image | None = None
-        self._font, self._small = ImageFont.load_default(TEXT_PIXELS), ImageFont.load_default(NAME_PIXELS)
+        self._font, self._small = (ImageFont.truetype(_font_file(), size) for size in (TEXT_PIXELS, NAME_PIXELS))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -226,6 +228,13 @@ class FilmPicture:
                 line = line[:-1]
             line = f"{line.rstrip()}..."
         pen.text((10, middle), line, ink, self._font, anchor="lm")
+
+
+def _font_file() -> Path:
+    """A font with the letters of most of Europe; Pillow's own has those of English."""
+    found = find_spec("matplotlib")
+    assert found is not None and found.origin is not None
+    return Path(found.origin).parent / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
 
 
 def _ahead(rover: Sequence[float], path: Places) -> Places:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+import warnings
 from pathlib import Path
 from typing import NamedTuple
 
@@ -118,7 +119,10 @@ class MapFigure:
         _add_scale(self)
         self._figure.suptitle(title, fontsize=12)
         self._figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False)
-        self._figure.savefig(file)
+        with warnings.catch_warnings():
+            # The font has no letters of Chinese, for example: they are boxes in the picture, and not worth a line.
+            warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+            self._figure.savefig(file)
 
 
 def _columns(labels: list[str], width_in: float) -> int:

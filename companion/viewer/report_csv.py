@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
 from pathlib import Path
-from typing import IO
 
 from companion.app import Companion
 from companion.core.frames import LocalFrame, NedPoint
@@ -40,22 +40,21 @@ class CsvReport(ReplayObserver):
     An empty cell: not known, or does not apply. Opening and ``close`` raise OSError.
     """
 
-    def __init__(self, folder: Path, clock: RecordClock) -> None:
+    def __init__(self, files: Mapping[str, Path], clock: RecordClock) -> None:
+        """``files``: where each of ``FILES`` is written."""
         self._clock = clock
-        self._files: list[IO[str]] = []
+        self._files = ExitStack()
         self._position_s = -math.inf
-        folder.mkdir(parents=True, exist_ok=True)
         writers = []
         for name, head in FILES.items():
-            self._files.append((folder / name).open("w", encoding="utf-8", newline=""))
-            writers.append(csv.writer(self._files[-1], lineterminator="\n"))
+            file = self._files.enter_context(files[name].open("w", encoding="utf-8", newline=""))
+            writers.append(csv.writer(file, lineterminator="\n"))
             writers[-1].writerow(head)
         self._poses, self._decisions, self._setpoints = writers
 
     def close(self) -> None:
         """Write what is left."""
-        for file in self._files:
-            file.close()
+        self._files.close()
 
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """See ``ReplayObserver``."""

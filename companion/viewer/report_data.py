@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.app import Companion
+from companion.app import Companion, Status
 from companion.core.grid import Cell
 from companion.navigation.field_step import Decision
 from companion.recording.contacts import Contact, contacts_of
@@ -24,8 +24,9 @@ from companion.recording.reader import Record
 from companion.recording.record_clock import record_clock
 from companion.replay.explain import Candidate, DecisionExplainer, Explanation, explanation_lines
 from companion.replay.replay import ReplayObserver, ReplayResult, replay
+from companion.safety.reasons import EndReason, Reason
 from companion.viewer.arrivals import Arrivals
-from companion.viewer.frame import frame_of, news_of, scene_of
+from companion.viewer.frame import doing_of, frame_of, news_of, scene_of
 from companion.viewer.map_tiles import TileWatch
 from companion.viewer.report_tables import Run, differences, tables_of
 from companion.viewer.run_tally import RunTally
@@ -65,6 +66,8 @@ def named(runs: Sequence[Run]) -> list[Run]:
 
 def joined(record: Record, watched: ReportWatch, run: Run, others: list[Run]) -> Json:
     """The parts of a report, put together."""
+    if run.result.companion is not None:
+        watched.end(run.result.companion, run.result.seconds, stopped_by_user=record.meta.stopped_by_user)
     contacts = [
         {
             "t": round(one["time_s"] - watched.began_s, 2),
@@ -149,9 +152,23 @@ class ReportWatch(ReplayObserver):
         self._rates.note(companion.vehicle)
         self.began_s = status.time_s - time_s
         self._news += [{**one, "t": round(time_s, 2)} for one in news_of(status)]
-        if time_s - self._frame_s < FRAME_S - 1e-6 and not companion.done:
-            return
-        self._frame_s = time_s
+        if time_s - self._frame_s >= FRAME_S - 1e-6 or companion.done:
+            self._frame_s = time_s
+            self._keep(companion, status, time_s)
+            self._take_map(companion, time_s)
+        elif doing_of(companion, status)["state"] != self._before["state"]:
+            self._keep(companion, status, time_s)  # however short it is, what the tables count is to be seen
+
+    def end(self, companion: Companion, time_s: float, *, stopped_by_user: bool) -> None:
+        """The record ends here, perhaps between two frames, and perhaps in the middle of the drive."""
+        if not self.frames or round(time_s, 2) > self.frames[-1]["t"]:
+            self._keep(companion, companion.status(), time_s)
+            self._take_map(companion, time_s)
+        if stopped_by_user and self._before["state"] != "ended":
+            self.frames[-1].update(state="ended", line=str(Reason(EndReason.STOPPED_BY_USER)), why="")
+
+    def _keep(self, companion: Companion, status: Status, time_s: float) -> None:
+        """A frame of this moment, without what has not changed since the last one."""
         executor = companion.executor
         self._steady.note(None if executor is None else executor.layout.origin)
         if self._start is None and status.pose is not None:
@@ -168,7 +185,6 @@ class ReportWatch(ReplayObserver):
         self.frames.append({key: value for key, value in frame.items() if self._before.get(key, ...) != value})
         self.frames[-1]["t"] = frame["t"]
         self._before = frame
-        self._take_map(companion, time_s)
 
     def _take_map(self, companion: Companion, time_s: float) -> None:
         executor, pose = companion.executor, companion.status().pose

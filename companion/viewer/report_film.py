@@ -141,7 +141,7 @@ def write_mp4(film: Film, file: Path) -> None:
     # It may say that a file could not be ended, and end well itself.
     if child.returncode != 0 or said or not file.exists():
         reason = said.splitlines()[-1] if said else f"exit code {child.returncode}"
-        raise FilmError(f"{file}: ffmpeg gave up: {reason}; use --gif")
+        raise FilmError(f"--mp4: ffmpeg gave up: {reason}; use --gif")
 
 
 def _filled(frames: list[Json]) -> list[Json]:

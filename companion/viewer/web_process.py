@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.core.clock import stopwatch_s
-from companion.storage.files import read_at_most
+from companion.storage.files import OsDisk, read_at_most, replace_file
 from companion.viewer import wire
 
 QUEUE = 20
@@ -101,8 +101,7 @@ def _token(file: Path) -> str:
         raise WebError(f"--web-token {file}: there is no folder {file.parent}; make it, or name another one")
     try:
         if not file.exists():
-            file.touch(mode=0o600)
-            file.write_text(secrets.token_urlsafe(TOKEN_BYTES) + "\n", encoding="ascii")
+            replace_file(OsDisk(), file, f"{secrets.token_urlsafe(TOKEN_BYTES)}\n".encode())  # whole, or not at all
         if others := stat.S_IMODE(file.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
             raise WebError(f"--web-token {file}: others may use this file (mode bits {others:03o}); chmod 600 {file}")
         token = read_at_most(file, MOST_TOKEN_BYTES).decode("ascii").strip()

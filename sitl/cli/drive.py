@@ -26,12 +26,13 @@ from companion.mission.mission import Mission, MissionError
 from companion.mission.outline_hint import outline_hint
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
+from companion.safety.reasons import EndReason, Reason
 from companion.settings import Settings, SettingsError
 from companion.viewer.live_viewer import LiveViewer
 from companion.viewer.terminal.painter import Painter, ViewError, terminal
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_turning_on_the_spot
-from sitl.cli.drive_outputs import Outputs, outputs, print_summary, write_collisions
+from sitl.cli.drive_outputs import Outputs, complete_record, outputs, print_summary
 from sitl.cli.drive_progress import Also, Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
 from sitl.faults.fault_file import FaultFileError
@@ -133,7 +134,7 @@ def drive(
         raise _refused(error) from error
     except KeyboardInterrupt:
         _print_last(painter, rows_below=1)
-        _end(page, "stopped by the user")
+        _end(page, str(Reason(EndReason.STOPPED_BY_USER)))
         _keep(run, recorder)
         raise StoppedError(_stopped(run, recorder if record else NullRecorder())) from None
     finally:
@@ -184,10 +185,10 @@ def _file(sensors: str | None) -> Path | None:
 
 def _keep(run: Drive | None, recorder: Recorder | NullRecorder) -> None:
     """What was recorded of a drive that was interrupted."""
-    recorder.close()
-    if run is not None and isinstance(recorder, Recorder):
-        with contextlib.suppress(OutputError):  # the program ends with what it can say
-            write_collisions(run, recorder)
+    recorder.close(stopped_by_user=True)
+    if run is not None and isinstance(recorder, Recorder) and not recorder.problem:
+        with contextlib.suppress(OutputError, MapError):  # the program ends with what it can say
+            complete_record(run, recorder)
 
 
 def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:

@@ -55,7 +55,8 @@ Speedup = Annotated[
     typer.Option(
         min=0.1,
         max=10_000.0,
-        help=f"Times real time, at most; default: as fast as possible, with --view {VIEWED_SPEEDUP:g}.",
+        help=f"Times real time, at most; default: as fast as possible, with --view {VIEWED_SPEEDUP:g}, "
+        f"with --web {WEB_SPEEDUP:g}.",
     ),
 ]
 View = Annotated[bool, typer.Option("--view", help="Show map, rover and decisions on this terminal.")]

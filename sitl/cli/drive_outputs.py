@@ -13,7 +13,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from companion.cli.inputs import OutputError, apart, picture, writable, written
+from companion.cli.inputs import OutputError, apart, picture, replaced, writable, written
 from companion.cli.report import write_report
 from companion.mapping.map_files import MapError
 from companion.recording.reader import load_record
@@ -88,8 +88,8 @@ class Outputs:
     def _write_image(self, run: Drive) -> str:
         if self.image is None:
             return ""
-        with written(self.image):
-            save_picture(run, self.image)
+        with replaced(self.image) as new:
+            save_picture(run, new)
         return f"picture: {self.image}"
 
     def _write_map(self, run: Drive) -> str:
@@ -104,8 +104,7 @@ class Outputs:
             return ""
         if recorder.problem:
             return recorder.problem  # a record that ends early does not change the result of the run
-        run.companion.save_map(recorder.directory / "map")
-        write_collisions(run, recorder)
+        complete_record(run, recorder)
         return "" if self.record is None else f"record:  {recorder.directory}"
 
     def _write_report(self, recorder: Recorder | NullRecorder, console: Console, run: Drive) -> str:
@@ -120,8 +119,8 @@ class Outputs:
         if self.json_file is None:
             return ""
         text = json.dumps({**run.report.as_json(), **made_with(run.settings)}, indent=2) + "\n"
-        with written(self.json_file):
-            self.json_file.write_text(text, encoding="utf-8")
+        with replaced(self.json_file) as new:
+            new.write_text(text, encoding="utf-8")
         return f"figures: {self.json_file}"
 
 
@@ -137,13 +136,19 @@ def _contacts_text(report: Report) -> str:
     return "\n".join(lines)
 
 
-def write_collisions(run: Drive, recorder: Recorder) -> None:
-    """The file of a record that lists all contacts, if there are any. Raises OutputError."""
+def complete_record(run: Drive, recorder: Recorder) -> None:
+    """The files of a record that are written at its end. Raises OutputError or MapError."""
+    _write_collisions(run, recorder)
+    run.companion.save_map(recorder.directory / "map")
+
+
+def _write_collisions(run: Drive, recorder: Recorder) -> None:
+    """All contacts, if there are any."""
     contacts = run.contacts
     if contacts:
         file = recorder.directory / "collisions.json"
-        with written(file):
-            file.write_text(json.dumps(contacts, indent=2) + "\n", encoding="utf-8")
+        with replaced(file) as new:
+            new.write_text(json.dumps(contacts, indent=2) + "\n", encoding="utf-8")
 
 
 def outputs(

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, replaced, writable, written
 from companion.mapping.map_files import MapError
 from companion.settings import Settings
 from companion.settings.versions import made_with
@@ -207,8 +207,8 @@ def _put_out(report: ExperimentReport, console: Console, json_file: Path | None,
         console.print(table)
     if json_file is not None:
         text = json.dumps({**made_with(Settings()), **report.as_json()}, indent=2) + "\n"
-        with written(json_file):
-            json_file.write_text(text, encoding="utf-8")
+        with replaced(json_file) as new:
+            new.write_text(text, encoding="utf-8")
         typer.echo(f"figures: {json_file}")
     if docs is not None:
         with written(docs):

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from companion.cli.inputs import OutputError, apart, writable, written
+from companion.cli.inputs import OutputError, apart, replaced, writable
 from companion.core.clock import WallClock
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
@@ -89,8 +89,8 @@ def _write_parameters(scenario: Scenario, behind: Physics, file: Path | None, in
         apart((file,), inputs)
         writable(file)
         parameters = firmware_parameters(scenario.parameters, behind.suite, steered=scenario.turning_radius_m > 0.0)
-        with written(file):
-            file.write_text(parameter_file(parameters), encoding="ascii")
+        with replaced(file) as new:
+            new.write_text(parameter_file(parameters), encoding="ascii")
     if scenario.parameter_file is not None:
         for note in scenario.parameter_file.firmware_notes(parameters, RECOMMENDED_PARAMETERS):
             typer.echo(note, err=True)

@@ -11,7 +11,7 @@ import typer
 from PIL import Image
 from pydantic import ValidationError
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture, replaced, writable, written
 from companion.core.own_parts import OwnPartError
 from companion.storage.validation import alike, describe_first
 from sitl.generators.canvas import FINE_M
@@ -62,8 +62,8 @@ def make(
         with written(mission):
             _write(ground, seed, given, measures, mission)
         if image is not None:
-            with written(image):
-                _draw(ground, seed, image)
+            with replaced(image) as new:
+                _draw(ground, seed, new)
     except (WorldError, NoWayError, OwnPartError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error

@@ -40,6 +40,13 @@ return shown.flatMap(([a, p], i) => shown.slice(i + 1).filter(([b, q]) => !a.con
 """
 
 
+EVENTS = """
+const states = ['waiting', 'driving', 'waiting', 'stopped', 'stopped', 'driving', 'stopped'];
+const frames = states.map((state, t) => ({ t, state, line: state, pose: [0, 0, 0] }));
+return import('viewer/record.js').then(({ Record }) => new Record({ scene: {}, frames }).events)
+    .then((events) => events.map((one) => [one.t, one.kind]))
+"""
+"""What is marked on the timeline of a run with these states."""
 COLOURS = """
 const canvas = document.querySelector('canvas'), box = canvas.getContext('2d'), count = {};
 const data = box.getImageData(0, 0, canvas.width, canvas.height).data;
@@ -241,6 +248,7 @@ def test_a_report_plays_from_its_file_to_its_end(report_file: Path) -> None:
         said = [report.text.index(text) for text in ("Mission ended", "Reached far end", "Heading for far end")]
         assert said == sorted(said), "what is new stands first"
         title = report.run("return document.title")
+        assert report.run(EVENTS) == [[2, "stop"], [3, "stop"], [6, "stop"]]
         report.press("Tables")
         report.shows("Targets", "reached", "Stops and waits")
         report.press("Decisions")

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from companion.recording.recorder import unused
 from sitl.cli.commands import app
+from tests.support.full_disk import full_after
 from tests.support.reports import report_data_in
 
 YARD = "[grid]\nsize = [20, 20]\nhome = [3, 3]\n[sitl]\nsensors = 'lidar-360'\n[[target]]\nfield = [6, 3]\n"
@@ -39,6 +40,18 @@ def test_a_full_disk_is_one_line_for_each_file_and_keeps_the_others(mission: Pat
     assert json.loads(figures.read_text())["outcome"] == "reached"
 
 
+def test_a_disk_that_gets_full_leaves_the_old_files_and_nothing_cut(mission: Path, tmp_path: Path) -> None:
+    image, figures = tmp_path / "run.png", tmp_path / "run.json"
+    for old in (image, figures):
+        old.write_text("old")
+    with full_after(300):
+        result = CliRunner().invoke(app, ["drive", str(mission), "--image", str(image), "--json", str(figures)])
+    says = "cannot be written: File too large; choose another place"
+    assert (result.exit_code, result.stderr.splitlines()) == (5, [f"{image}: {says}", f"{figures}: {says}"])
+    assert sorted(tmp_path.iterdir()) == [figures, image, mission]
+    assert image.read_text() == figures.read_text() == "old"
+
+
 @pytest.mark.parametrize("command", [["drive", "--json"], ["physics", "--port", "1", "--write-params"]])
 def test_a_full_disk_is_one_line(mission: Path, command: list[str]) -> None:
     result = CliRunner().invoke(app, [*command, "/dev/full", str(mission)])
@@ -59,7 +72,11 @@ def test_a_report_needs_no_record_and_leaves_none(mission: Path, tmp_path: Path)
     assert result.exit_code == 0 and f"report:  {report} (0." in result.stdout and "record:" not in result.stdout
     assert [file.name for file in report.parent.iterdir()] == ["run.html"]
     told = report_data_in(report)
-    assert told["frames"][-1]["state"] == "ended" and told["decisions"] and told["contacts"] == []
+    assert (
+        [one["state"] for one in told["frames"] if "state" in one][-1] == "ended"
+        and told["decisions"]
+        and told["contacts"] == []
+    )
     for other, says in (("--record", "another file"), ("--json", "another file")):
         bad = CliRunner().invoke(app, ["drive", str(mission), "--report", str(report), other, str(report)])
         assert bad.exit_code == 2 and says in bad.stderr and bad.stderr.count("\n") == 1 and bad.stdout == ""

@@ -19,15 +19,20 @@ from PIL import Image
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
+from companion.app import Companion, Status
 from companion.cli.commands import app
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
-from companion.replay.replay import replay
-from companion.viewer import map_tiles, report_mcap
+from companion.replay.replay import Observers, replay
+from companion.viewer import frame, map_tiles, report_data, report_mcap
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
-from companion.viewer.report_data import ReportWatch, counted
+from companion.viewer.frame import doing_of
+from companion.viewer.report_csv import FILES
+from companion.viewer.report_data import ReportWatch, counted, joined, run_of
 from companion.viewer.report_tables import tables_of
+from companion.viewer.run_tally import RunTally
 from companion.viewer.wire import tiles_in
+from tests.support.full_disk import full_after
 from tests.support.records import START_US, recorded, write_record
 from tests.support.reports import report_data_in
 from tests.support.rig import yard
@@ -343,3 +348,55 @@ def test_what_cannot_be_written_is_one_line_and_no_record_is_harmed(
     assert (result.exit_code, result.output.count("\n")) == (2, 1) and says in result.output
     assert {file: file.read_bytes() for file in record.rglob("*") if file.is_file()} == before
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("option", "place"), [("--out", "r.html"), ("--gif", "r.gif"), ("--mcap", "r.mcap"), ("--csv", "csv")]
+)
+def test_a_full_disk_leaves_what_was_there_and_nothing_cut(
+    record: Path, tmp_path: Path, option: str, place: str
+) -> None:
+    old = [tmp_path / "csv" / name for name in FILES] if option == "--csv" else [tmp_path / place]
+    for file in old:
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("old")
+    with full_after(1000):
+        result = CliRunner().invoke(app, ["report", str(record), option, str(tmp_path / place)])
+    says = f"{tmp_path / place}: cannot be written: File too large; choose another place"
+    assert (result.exit_code, result.output.splitlines()) == (2, [says])
+    assert sorted(file for file in tmp_path.rglob("*") if file.is_file()) == sorted(old)
+    assert {file.read_text() for file in old} == {"old"}
+
+
+@pytest.fixture(scope="module")
+def broken_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The record of a drive that was broken off in its middle."""
+    folder = tmp_path_factory.mktemp("broken off")
+    return recorded(folder / "record", yard(folder), limit_s=52.5)
+
+
+def test_a_report_reaches_the_last_moment_of_a_drive_that_was_broken_off_and_says_so(
+    broken_off: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also a stop is seen that was shorter than the time between two frames."""
+
+    def doing(companion: Companion, status: Status) -> dict[str, Any]:
+        told = doing_of(companion, status)
+        return {**told, "state": "stopped"} if abs(status.time_s - 50.15) < 0.01 else told
+
+    for module in (report_data, frame):
+        monkeypatch.setattr(module, "doing_of", doing)
+    record = load_record(broken_off)
+    tally, watched = RunTally(), ReportWatch(record)
+    run = run_of(record, tally, replay(record, Observers((tally, watched))))
+    data = joined(record, watched, run, [])
+    times = [one["t"] for one in data["frames"]]
+    assert times[-1] == round(run.result.seconds, 2) >= data["decisions"][-1]["t"]
+    assert times[-1] - times[-2] < 0.39, "no frame was due"
+    states = [(one["t"], one["state"]) for one in data["frames"] if "state" in one]
+    assert [state for _, state in states][-3:] == ["driving", "stopped", "driving"]
+    assert states[-1][0] - states[-2][0] == pytest.approx(0.05)
+    assert len(times) < run.result.seconds / 0.4 + 5
+    record.meta.stopped_by_user = True
+    last = joined(record, watched, run, [])["frames"][-1]
+    assert (last["state"], last["line"], last["t"]) == ("ended", "stopped by the user", times[-1])

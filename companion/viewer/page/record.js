@@ -137,8 +137,8 @@ function eventsOf(record) {
       if (status === "reached") events.push({ t: frame.t, kind: "good", text: `${name} reached` });
       else if (GIVEN_UP.has(status)) events.push({ t: frame.t, kind: "given-up", text: `${name}: ${status}` });
     });
-    const stands = frame.state === "stopped" || frame.state === "waiting";
-    if (stands && before.state === "driving")
+    const stops = frame.state === "stopped" && before.state !== "stopped";
+    if (stops || (frame.state === "waiting" && before.state === "driving"))
       events.push({ t: frame.t, kind: "stop", text: frame.line, place: (frame.pose ?? before.pose)?.slice(0, 2) });
   });
   for (const contact of record.contacts)

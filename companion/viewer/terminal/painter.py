@@ -19,13 +19,15 @@ from typing import TextIO, cast
 from rich.console import Console
 
 from companion.storage.unbuffered import UnbufferedOutput
-from companion.viewer.terminal.screen import View, render
+from companion.viewer.terminal.screen import SMALLEST, View, render
 
 VIEWS_HZ = 5.0
 """Views per second: enough to see it drive, few enough for a slow connection."""
 CLOSING_S, SUSPENDING_S = 1.0, 0.3
 """How long to wait for a terminal that accepts nothing any more."""
 ENTER, LEAVE, CLEAR = "\x1b[?1049h\x1b[?25l\x1b[2J\x1b[H", "\x1b[0m\x1b[?25h\x1b[?1049l", "\x1b[2J"
+LAST_ROWS = SMALLEST[1] - 1
+"""The last picture has at least so many: it leaves one for the prompt."""
 NAMES = {1: "standard output", 2: "standard error"}
 
 MakeView = Callable[[], View]
@@ -115,10 +117,16 @@ class Painter:
         return self._ended and self._thread.is_alive()
 
     def print_last(self, rows_below: int = 0) -> None:
-        """Print the last view, so that it stays on the terminal, with room for some lines below."""
+        """Print the last view, so that it stays on the terminal, with room for some lines below.
+
+        Where that leaves too few rows for a picture that was there until now, it is drawn one row smaller than is
+        usual, for the prompt; the lines below then move it up.
+        """
         if self._make is not None:
-            rows = max(self._console.height - 1 - rows_below, 1)
-            self._console.file.write("\n".join(self._lines(self._make(), rows)) + "\n")
+            height = self._console.height
+            least = LAST_ROWS if height >= SMALLEST[1] else 1
+            lines = self._lines(self._make(), max(height - 1 - rows_below, least), LAST_ROWS)
+            self._console.file.write("\n".join(lines) + "\n")
 
     def _suspend(self, number: int, frame: FrameType | None) -> None:
         """Ctrl-Z: restore the terminal until this process continues."""
@@ -180,12 +188,12 @@ class Painter:
         if text:
             self._write(text)
 
-    def _lines(self, view: View, rows: int) -> list[str]:
-        """A view as lines of characters and control codes, at most so many."""
+    def _lines(self, view: View, rows: int, least_rows: int = SMALLEST[1]) -> list[str]:
+        """A view as lines of characters and control codes, at most so many. ``least_rows``: fewer give no picture."""
         console = self._console
         colour = not console.no_color and console.color_system is not None
         with console.capture() as captured:
-            console.print(render(view, console.width, rows, colour=colour), height=rows)
+            console.print(render(view, console.width, rows, colour=colour, least_rows=least_rows), height=rows)
         return captured.get().rstrip("\n").split("\n")[:rows]
 
     def _write(self, text: str) -> None:

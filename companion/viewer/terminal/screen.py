@@ -57,10 +57,10 @@ class View:
     headline: Headline | None = None
 
 
-def render(view: View, columns: int, rows: int, *, colour: bool) -> RenderableType:
-    """The whole screen, with this many columns and rows of characters."""
+def render(view: View, columns: int, rows: int, *, colour: bool, least_rows: int = SMALLEST[1]) -> RenderableType:
+    """The whole screen, with this many columns and rows of characters. ``least_rows``: fewer give no picture."""
     head = _headline(view.headline, columns)
-    if columns < SMALLEST[0] or rows < SMALLEST[1]:
+    if columns < SMALLEST[0] or rows < least_rows:
         return _without_picture(view, head, columns, rows)
     news_rows = max(NEWS_ROWS, rows // NEWS_SHARE)
     main_rows = rows - len(head) - news_rows

@@ -11,7 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from companion.storage.files import NEW_SUFFIX, OsDisk, open_file, read_at_most, replace_file, set_aside, why_no_file
+from companion.storage.files import (
+    NEW_SUFFIX,
+    OsDisk,
+    open_file,
+    read_at_most,
+    replace_file,
+    set_aside,
+    whole_file,
+    why_no_file,
+)
 
 HERE = Path("/d/state")
 
@@ -165,3 +174,27 @@ def test_a_pipe_under_the_name_of_the_new_file_fails_the_write(tmp_path: Path) -
     os.mkfifo(tmp_path / "file.new")
     with pytest.raises(OSError, match="No such device"):
         replace_file(OsDisk(), tmp_path / "file", b"words")
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
+def test_a_file_that_was_not_written_to_its_end_leaves_the_old_one(tmp_path: Path, error: BaseException) -> None:
+    file = tmp_path / "r.png"
+    file.write_text("old")
+    (tmp_path / ".r.new.png").write_text("of a program that was killed")
+    with pytest.raises(type(error)), whole_file(file) as new:
+        assert new.suffix == ".png" and not new.exists()
+        new.write_text("half")
+        raise error
+    assert [one.name for one in tmp_path.iterdir()] == ["r.png"] and file.read_text() == "old"
+
+
+def test_a_whole_file_takes_the_place_of_the_old_one_also_behind_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    file, link = tmp_path / "real" / "r.txt", tmp_path / "link.txt"
+    link.symlink_to(file)
+    for text in ("first", "second"):
+        with whole_file(link) as new:
+            new.write_text(text)
+        assert link.is_symlink() and file.read_text() == text and [*file.parent.iterdir()] == [file]
+    with whole_file(Path("/dev/null")) as new:
+        assert new == Path("/dev/null")

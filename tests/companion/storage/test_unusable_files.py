@@ -234,6 +234,7 @@ OPENED_OTHERWISE = {
     "sitl/scenario.py": "World.open",
     "companion/mavlink/port_users.py": "/proc",
     "sitl/cli/missions.py": "the program's own files",
+    "sitl/cli/runs.py": "a folder, to lock it",
     "sitl/campaign/run_store.py": "written only, after refuse_pipe",
     "sitl/campaign/tables.py": "written only, after refuse_pipe",
 }

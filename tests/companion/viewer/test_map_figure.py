@@ -38,7 +38,7 @@ def test_the_ground_fills_the_page(tmp_path: Path, size: tuple[float, float]) ->
     figure = MapFigure(framed(np.array([(0.0, 0.0), (height_m, width_m)])))
     figure.axes.imshow([[[10, 200, 10]]], extent=figure.ground)
     figure.key("red", "something with a long name that says what it is, and how much of it there is: a lot " * 2)
-    figure.save(tmp_path / "a.png", "Title")
+    figure.save(tmp_path / "a.png", "Title of 測試")  # a warning would be an error here
     assert (figure.axes.get_xlabel(), figure.axes.get_ylabel()) == ("east, m", "north, m")
     scale = next(text for text in figure.axes.findobj(Text) if text.get_text() in ("2 m", "5 m", "10 m", "20 m"))
     assert float(scale.get_text().split()[0]) > 0.05 * figure.ground.width_m

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from PIL import ImageFont
 
-from companion.viewer.film_picture import SIDE_PIXELS, section_of
+from companion.viewer.film_picture import SIDE_PIXELS, _font_file, section_of
 from companion.viewer.report_film import MOST_PICTURES, Film, FilmError
 
 GROUND = {"south_m": -50.0, "west_m": -50.0, "cell_m": 0.25, "columns": 400, "rows": 400, "tile": 64}
@@ -53,3 +54,9 @@ def test_any_drive_fits_into_the_picture(places: list[tuple[float, float]]) -> N
 def test_without_a_map_there_is_no_film() -> None:
     with pytest.raises(FilmError, match="the mission had not begun"):
         Film({"scene": {}, "frames": [{"pose": None, "t": 0.0}], "tiles": [], "contacts": []})
+
+
+def test_names_with_the_letters_of_europe_can_be_written() -> None:
+    font = ImageFont.truetype(_font_file(), 15)
+    shapes = {letter: bytes(font.getmask(letter)) for letter in "üßéłžя"}
+    assert bytes(font.getmask("\uffff")) not in shapes.values() and len(set(shapes.values())) == len(shapes)

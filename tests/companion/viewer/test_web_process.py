@@ -27,6 +27,7 @@ from companion.viewer.map_tiles import run_lengths
 from companion.viewer.server import ACTIONS_A_SECOND, MOST_SPECTATORS, WebApp, fullest
 from companion.viewer.web_process import WebError, WebPlace, WebProcess, web_place
 from tests.companion.viewer.test_live_board import SCENE, frame
+from tests.support.full_disk import full_after
 
 WAIT_S = 20.0
 TOKEN = "a-token-for-tests"
@@ -275,6 +276,12 @@ def test_places_and_tokens(tmp_path: Path) -> None:
     file.write_text("short")
     with pytest.raises(WebError, match="8 letters or more"):
         web_place("8000", file)
+
+
+def test_a_full_disk_leaves_no_token_that_is_cut(tmp_path: Path) -> None:
+    with full_after(5), pytest.raises(WebError, match="File too large"):
+        web_place("8000", tmp_path / "token")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

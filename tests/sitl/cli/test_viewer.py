@@ -53,5 +53,10 @@ def test_the_last_picture_of_a_drive_stays_on_the_terminal_and_under_it_the_outc
         assert ended(drawn) == 0
     last = [line.strip() for line in drawn.last.decode().split("\r\n")]
     shown = last[-rows:]
-    assert any("outcome: reached, 1 of 1" in line for line in shown[-5:]) and "picture:" in " ".join(shown[-4:])
+    assert any("outcome: reached, 1 of 1" in line for line in shown[-6:]) and "picture:" in " ".join(shown[-4:])
     assert columns < 60 or any("✓ reached" in line for line in shown)
+
+
+def test_the_help_of_drive_says_how_fast_it_is_with_a_page() -> None:
+    told = CliRunner().invoke(app, ["drive", "--help"], env={"COLUMNS": "300"}).output
+    assert "as fast as possible, with --view 10, with --web 1." in told

@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from companion.viewer.terminal.painter import CLEAR, Painter, ViewError, terminal
-from companion.viewer.terminal.screen import View
+from companion.viewer.terminal.screen import SMALLEST, View
 from tests.companion.viewer.terminal.test_screen import ROOM, a_view, sketch
 from tests.support.pseudo_terminal import ENTER, LEAVE
 from tests.support.served import wait_until
@@ -117,3 +117,14 @@ def test_a_terminal_that_is_stuck_is_not_waited_for_long() -> None:
     assert painter.stuck
     stream.going.set()
     painter._thread.join(10.0)
+
+
+@pytest.mark.parametrize("rows_below", [0, 3])
+def test_the_smallest_terminal_that_shows_a_picture_keeps_the_last_one(rows_below: int) -> None:
+    stream = io.StringIO()
+    with Painter(console(stream, width=SMALLEST[0], height=SMALLEST[1])) as painter:
+        painter.show(lambda: a_view(sketch(ROOM), events=("the newest",)))
+    stream.truncate(stream.seek(0))
+    painter.print_last(rows_below)
+    last = stream.getvalue()
+    assert last.count("\n") == SMALLEST[1] - 1 and "╰" in last and "the newest" in last and "too few" not in last
