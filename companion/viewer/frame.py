@@ -353,7 +353,7 @@ def _figures(companion: Companion, status: Status) -> Json:
     return {
         "clearance_m": clear_m,
         "planning_ms": round(1e3 * searches_s[-1], 1) if searches_s else None,
-        "latency_ms": round(1e3 * run.vehicle.latency_s, 1),
+        "latency_ms": round(1e3 * run.vehicle.latency_s, 1) or None,  # 0: not measured yet
         "tick_ms": round(1e3 * ticks[-1], 2) if ticks else None,
     }
 

@@ -10,6 +10,7 @@ from sitl.cli.commands import app
 RUNS = 2
 
 
+@pytest.mark.thorough
 def test_wang_table4(tmp_path):
     file, docs = tmp_path / "figures.json", tmp_path / "docs"
     arguments = [

@@ -172,6 +172,7 @@ def test_of_a_files_old_versions_some_are_kept(tmp_path: Path, monkeypatch: pyte
     assert left == ["3", "4", "5"] and other.is_dir()
 
 
+@pytest.mark.thorough
 def test_a_file_that_is_edited_while_the_program_loads_makes_no_kernel_for_others(tmp_path: Path) -> None:
     program = Program(tmp_path / "one", tmp_path / "cache")
     outer = program.folder / "companion" / "outer.py"
