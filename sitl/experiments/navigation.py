@@ -261,9 +261,8 @@ def shortfalls(series: tuple[Series, ...]) -> str:
 
 def run(options: Options, advance: Advance) -> NavigationReport:
     """Make all runs. The result (but for times) does not depend on ``jobs``."""
-    given = list(_given_grounds(options))  # first: they may be refused
+    planners, given = planners_of(options, PLANNERS), list(_given_grounds(options))  # first: they may be refused
     grounds = [*_paper_grounds(options), *_made_grounds(options), *given]
-    planners = planners_of(options, PLANNERS)
     registry.warm_up(planners)
     tasks = []
     for ground in grounds:

@@ -162,6 +162,7 @@ def test_mavproxy_beside_the_companion(tmp_path: Path) -> None:
         assert "Traceback" not in ground.output
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_mavproxy_gives_the_vehicle_the_key_that_the_companion_has(tmp_path: Path) -> None:
     """The companion is on a port where the vehicle believes only signed packets."""

@@ -63,6 +63,7 @@ def check_same_bytes(mission: str, environment: dict[str, str]) -> None:
     assert float(driven_m) > 10.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "mission", [EVERYTHING, pytest.param(AUTO, marks=pytest.mark.thorough)], ids=["everything", "auto"]
 )

@@ -17,6 +17,7 @@ from companion.settings import Settings
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 from tests.docs.test_docs import APPS, ROOT, blocks
+from tests.support.quick import first_of
 from tests.support.rig import ARM, ARMED, GUIDED, HOLD, SET_MODE
 from tests.support.served import Served, process, wait_until
 
@@ -73,7 +74,7 @@ def test_commands_at_the_desk_work_in_their_order(tmp_path: Path, monkeypatch: p
 
 
 @pytest.mark.parametrize("sensors", ["lidar-360", pytest.param("lidar-90", marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("step", STEPS)
+@first_of(1, "step", STEPS)
 def test_each_mission_is_driven_in_the_simulator(step: str, sensors: str) -> None:
     mission = load_mission(ROOT / "missions" / "first-drive" / f"{step}.toml")
     scenario = replace(scenario_from_mission(mission), sensors=sensors)

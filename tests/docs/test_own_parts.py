@@ -98,6 +98,7 @@ def test_a_package_may_register_a_name(lines: str, tmp_path: Path, monkeypatch: 
         make_planner("liness", PlannerSettings())
 
 
+@pytest.mark.thorough
 def test_the_controller_of_the_page_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dice = written("planners.md", "Dice", tmp_path, monkeypatch)
     settings = tmp_path / "dice.toml"

@@ -18,6 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.executive.mission_executor import MissionExecutor
 from companion.vehicle.state import PARAMETERS_KEPT
 from tests.support.forked import Forked
+from tests.support.quick import first_of
 from tests.support.rig import Rig, yard
 from tests.support.served import finished, mission_path, served
 
@@ -203,6 +204,7 @@ FLOODS = [
 ]
 
 
+@pytest.mark.thorough
 def test_a_thousand_messages_a_second_do_not_keep_it_from_its_mission(tmp_path: Path) -> None:
     """Of all kinds in turn."""
     rig = Rig(yard(tmp_path))
@@ -254,8 +256,8 @@ def test_range_data_at_a_thousand_a_second_is_not_mapped_so_often_and_parameters
     assert set(rig.companion.vehicle.parameters) <= PARAMETERS_KEPT
 
 
-@pytest.mark.parametrize(
-    ("flood", "hz"), [(lidar, 20), pytest.param(lidar, 40, marks=pytest.mark.thorough), (lidar, 1000), (beams, 1000)]
+@first_of(
+    1, ("flood", "hz"), [(lidar, 20), pytest.param(lidar, 40, marks=pytest.mark.thorough), (lidar, 1000), (beams, 1000)]
 )
 def test_a_sensor_that_sees_nothing_far_too_often_does_not_hide_the_wall_from_the_one_that_sees_it(
     tmp_path: Path, flood: Callable[[int], bytes], hz: int

@@ -16,6 +16,7 @@ from companion.safety.reasons import LatchReason, RunPhase, WaitReason
 from tests.clients.scene import HOME_DEG
 from tests.scenarios.test_requested_goals import low_battery
 from tests.support.asker import Asker
+from tests.support.quick import first_of
 from tests.support.rig import ARM, AUTO, GUIDED, HOLD, MANUAL, SET_MODE, without, yard
 
 WAYPOINT, GUIDED_ENABLE, LIMITS, DELAY = 16, 92, 222, 93
@@ -97,7 +98,8 @@ def assert_silent_since(rig: Asker, since_s: float) -> None:
     assert [one for one in rig.sent_since(since_s) if one.moves_or_changes] == []
 
 
-@pytest.mark.parametrize(
+@first_of(
+    1,
     ("mode", "metres"),
     [
         (MANUAL, 2.2),  # setting off
@@ -159,6 +161,7 @@ def test_a_place_that_cannot_be_reached_is_stood_before_until_the_limit(tmp_path
     assert_steered_only_in_the_leg(rig)
 
 
+@pytest.mark.thorough
 def test_range_data_that_fails_in_a_leg_stops_the_rover_and_then_holds(tmp_path: Path) -> None:
     rig = in_leg(tmp_path)
     rig.change, since_s = without("OBSTACLE_DISTANCE", "DISTANCE_SENSOR"), rig.now_s()
@@ -226,7 +229,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("fields", OTHERS.values(), ids=OTHERS)
+@first_of(2, "fields", OTHERS.values(), ids=OTHERS)
 def test_what_is_no_leg_of_ours_is_not_driven(tmp_path: Path, fields: dict[str, int]) -> None:
     rig = in_auto(tmp_path, ROUND_THE_WALL)
     rig.change = Shutdown(rig, **fields)

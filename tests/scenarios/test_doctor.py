@@ -31,6 +31,7 @@ from sitl.scenario import scenario_from_mission
 from tests.sitl.network.test_server import free_port
 from tests.support.mavlink_vehicle import Station
 from tests.support.party import KEY, TIME
+from tests.support.quick import first_of
 from tests.support.rig import yard
 from tests.support.served import finished, mission_path, process
 from tests.support.shared_data import SHARED, needs_shared
@@ -129,7 +130,7 @@ def test_a_rover_that_is_well(tmp_path: Path) -> None:
 S, W, N = Level.STOP, Level.WARN, Level.NOTE
 
 
-@pytest.mark.parametrize(
+@first_of(4,
     ("values", "finding", "level"),
     [
         ({"OA_TYPE": 1}, "oa-type", S),

@@ -35,6 +35,7 @@ def driven(folder: Path, open_s: str, sensors: str = "lidar-90") -> Drive:
     return run
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("sensors", ["lidar-90", pytest.param("lidar-360", marks=pytest.mark.thorough)])
 def test_a_door_that_opens_lets_the_rover_on(sensors: str, tmp_path: Path) -> None:
     run = driven(tmp_path, "[130.0]", sensors)

@@ -102,6 +102,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
     yield Driven(run, viewer.views, statuses, page.told, record)
 
 
+@pytest.mark.thorough
 def test_targets_and_walls_stay_where_they_are_when_the_autopilot_counts_from_elsewhere(driven: Driven) -> None:
     origin, start = driven.run.companion.origin, driven.run.scenario.start
     assert origin is not None and driven.run.mission.targets
@@ -115,6 +116,7 @@ def test_targets_and_walls_stay_where_they_are_when_the_autopilot_counts_from_el
         assert (seen.south_m, seen.west_m) == pytest.approx((0.0, 0.0), abs=1.0)
 
 
+@pytest.mark.thorough
 def test_on_the_page_and_in_the_report_they_stay_too(driven: Driven) -> None:
     places = [one["targets"][0]["place"] for one in driven.told if one["kind"] == "scene" and one["targets"]]
     assert len({one["map_epoch"] for one in driven.told if one["kind"] == "scene"}) == 3

@@ -15,6 +15,7 @@ import typer
 from companion.cli.entry import StoppedError, start
 from companion.recording.reader import load_record
 from tests.support.forked import run
+from tests.support.quick import first_of
 from tests.support.served import PATIENCE_S, finished, process, slowness
 
 SCRIPTS = {"rover-companion": "companion", "rover-sitl": "sitl"}
@@ -136,7 +137,7 @@ def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
     assert all((record / name).stat().st_size > 0 for name in ("link.tlog", "map.yaml", "map.pgm"))
 
 
-@pytest.mark.parametrize(("name", "words"), [("rover-companion", "--from-autopilot"), ("rover-sitl", "--time-limit-s")])
+@first_of(1, ("name", "words"), [("rover-companion", "--from-autopilot"), ("rover-sitl", "--time-limit-s")])
 def test_on_a_narrow_terminal_no_option_is_cut(name: str, words: str) -> None:
     which = "run" if name == "rover-companion" else "drive"
     narrow = {**os.environ, "COLUMNS": "60"}

@@ -34,6 +34,7 @@ from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
 from sitl.sensors.range_sensors import Defect
 from sitl.sim_link import SimLink
+from tests.support.quick import first_of
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 HOLD, ARMED = 4, 128
@@ -124,8 +125,8 @@ STOPPED: dict[str, tuple[tuple[Fault, ...], int, str]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.thorough if name in TOLD_ELSEWHERE else ()) for name in STOPPED]
+@first_of(
+    1, "name", [pytest.param(name, marks=pytest.mark.thorough if name in TOLD_ELSEWHERE else ()) for name in STOPPED]
 )
 def test_a_rover_that_stops_says_why(name: str) -> None:
     faults, armed, words = STOPPED[name]
@@ -137,6 +138,7 @@ def test_a_rover_that_stops_says_why(name: str) -> None:
     assert any(words in text for text in run.texts()), run.texts()
 
 
+@pytest.mark.thorough
 def test_a_low_battery_that_must_stop_the_rover_does() -> None:
     run = Run(FaultPlan((BatteryLow(50.0, volts=10.0),)), limit_s=50.0)
     vehicle = run.drive.simulator._vehicle

@@ -17,6 +17,7 @@ from companion.navigation.field_step import Action
 from companion.safety.reasons import Doubt, LatchReason, WaitReason
 from companion.settings import Settings, parse_settings
 from tests.support.asker import Asker
+from tests.support.quick import first_of
 from tests.support.rig import ARM, GUIDED, HOLD, SET_MODE, Rig, yard
 from tests.support.stored import CIRCLE_IN, CIRCLE_OUT, KEEP_IN, KEEP_OUT, POLYGONS, Person, box, stored
 
@@ -97,7 +98,7 @@ def changes(rig: Rig) -> list[int]:
     return [one.command for one in rig.sent if one.command in (SET_MODE, ARM)]
 
 
-@pytest.mark.parametrize("margin_m", [0.0, 1.0])
+@first_of(1, "margin_m", [0.0, 1.0])
 def test_it_goes_round_what_the_autopilot_keeps_out(tmp_path: Path, margin_m: float) -> None:
     rig = driven(tmp_path, stored([*ALL, *NORTH], **POLYGONS, FENCE_MARGIN=margin_m))
     rig.finish()
@@ -107,6 +108,7 @@ def test_it_goes_round_what_the_autopilot_keeps_out(tmp_path: Path, margin_m: fl
     assert rig.nearest_m(1.5, 3.0, 7.0, 10.0) >= max(margin_m, 0.35) - 0.15
 
 
+@pytest.mark.thorough
 def test_without_the_fence_it_would_have_gone_there(tmp_path: Path) -> None:
     """The same ground, the fence not enabled: so the tests above can fail."""
     rig = driven(tmp_path, stored([*ALL, *box(KEEP_OUT, -7.0, 3.0, -1.5, 10.0)], FENCE_ENABLE=0.0))
@@ -145,6 +147,7 @@ def test_outside_the_circle_round_home_is_refused_too(tmp_path: Path) -> None:
         rig.finish()
 
 
+@pytest.mark.thorough
 def test_a_rover_that_starts_outside_is_told_so_and_not_even_armed(tmp_path: Path) -> None:
     rig = driven(tmp_path, stored(box(KEEP_IN, -6.0, 4.0, 7.0, 20.0), **POLYGONS, FENCE_MARGIN=1.0))
     rig.run_for(50.0)
@@ -156,7 +159,7 @@ def test_a_rover_that_starts_outside_is_told_so_and_not_even_armed(tmp_path: Pat
     assert rig.companion.outcome.complete, "once the fence is another one"
 
 
-@pytest.mark.parametrize("seed", range(3))
+@first_of(1, "seed", range(3))
 def test_a_fence_that_changes_on_the_way_is_heeded_at_once(tmp_path: Path, seed: int) -> None:
     rig = driven(tmp_path, stored(ALL, **POLYGONS, FENCE_MARGIN=0.0), seed=seed)
     rig.until_driven(0.5)
@@ -280,7 +283,7 @@ def test_a_fence_that_is_switched_on_by_command_is_heeded(tmp_path: Path) -> Non
     assert rig.nearest_m(1.5, 3.0, 7.0, 10.0) > 0.2
 
 
-@pytest.mark.parametrize("seed", range(2))
+@first_of(1, "seed", range(2))
 def test_over_a_bad_line_it_does_not_begin_before_it_knows_the_fence(tmp_path: Path, seed: int) -> None:
     rig, rng = driven(tmp_path, stored([*ALL, *NORTH], **POLYGONS, FENCE_MARGIN=0.0)), np.random.default_rng(seed)
     rig.lose = lambda: bool(rng.random() < 0.3)
@@ -290,6 +293,7 @@ def test_over_a_bad_line_it_does_not_begin_before_it_knows_the_fence(tmp_path: P
     assert rig.nearest_m(1.5, 3.0, 7.0, 10.0) > 0.2
 
 
+@pytest.mark.thorough
 def test_an_autopilot_that_does_not_tell_its_fence_is_waited_for(tmp_path: Path) -> None:
     rig = driven(tmp_path, stored(ALL, **POLYGONS))
     rig.change = lambda message: None if message.get_type() in ("MISSION_COUNT", "MISSION_ACK") else message

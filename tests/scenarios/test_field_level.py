@@ -91,6 +91,7 @@ def test_table_1(tmp_path):
     assert "N.F." in page and "43.06" in page and (docs / "images" / "kwasniewski-table1.png").exists()
 
 
+@pytest.mark.thorough
 def test_navigation_says_how_many_runs_a_row_is_made_of(tmp_path):
     arguments = ["experiment", "navigation", "--runs", "2", "--seed", "3", "--planners", "astar,hybrid"]
     result = CliRunner().invoke(app, [*arguments, "--docs", str(tmp_path / "docs")])

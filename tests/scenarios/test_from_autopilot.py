@@ -110,6 +110,7 @@ def test_what_cannot_be_driven_is_one_line(tmp_path: Path, rows: list[Row], text
         fetched(holding(tmp_path, rows))
 
 
+@pytest.mark.thorough
 def test_a_mission_that_changes_on_the_way_is_told_and_the_old_one_driven(tmp_path: Path) -> None:
     rig = holding(tmp_path, ROUND)
     rig.restart_companion(fetched(rig))
@@ -204,6 +205,7 @@ def test_a_mission_that_hands_over_is_not_armed_for(tmp_path: Path) -> None:
         refuse_arming(mission, arm=True)
 
 
+@pytest.mark.thorough
 def test_it_is_taken_up_again_though_home_is_another(tmp_path: Path) -> None:
     """The autopilot tells its home of now as item 0, and that moves with every start."""
     rig = Asker(yard(tmp_path), late_s=44.0, state=tmp_path / "state")

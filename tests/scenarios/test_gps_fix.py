@@ -15,6 +15,7 @@ from companion.replay.replay import replay
 from companion.safety.reasons import Doubt, RunPhase, WaitReason
 from companion.settings import Settings, parse_settings
 from sitl.faults.plan import Fault, FixName, GpsFixChange, GpsFixUntold
+from tests.support.quick import first_of
 from tests.support.records import recorded
 from tests.support.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, Rig, without, yard
 
@@ -231,7 +232,7 @@ def test_a_fix_that_is_not_told_is_a_gate_that_shuts(tmp_path: Path) -> None:
     assert rig.gave(Doubt.GPS_SILENT) and rig.companion.outcome.complete
 
 
-@pytest.mark.parametrize("after_s", [0.5, 5.0], ids=["while it steps", "afterwards"])
+@first_of(1, "after_s", [0.5, 5.0], ids=["while it steps", "afterwards"])
 def test_a_companion_that_is_killed_round_a_step_goes_on(tmp_path: Path, after_s: float) -> None:
     rig = stepped(tmp_path, fix_fault(duration_s=100.0), state=tmp_path / "state")
     rig.run_for(after_s)

@@ -44,6 +44,7 @@ def guarded(tmp_path: Path) -> Mission:
     return replace(mission, sitl=replace(mission.sitl, parameters=parameters))
 
 
+@pytest.mark.thorough
 def test_with_a_guard_a_dead_companions_rover_stands_soon_and_touches_nothing(guarded: Mission) -> None:
     """Left alone for 0.3 s and braking at 1 m/s², from 2 m/s: 3 m at most; without a guard it is 8.4 m."""
     told = overheard(guarded, 0, PLANNED)

@@ -117,6 +117,7 @@ def test_a_rover_whose_lidar_gets_no_echo_any_more_stops_and_says_so(
     assert any("lidar 1 (LD19) has seen nothing" in line for line in run.report.said), run.report.said
 
 
+@pytest.mark.thorough
 def test_it_goes_on_when_the_cable_is_in_again(tmp_path: Path) -> None:
     fault = LidarFault(DRIVING_S, DRIVING_S + 1.5, since="driving", unplugged=True)
     report = drive(tmp_path, "RPLIDAR-C1", faults=(fault,)).report
@@ -124,6 +125,7 @@ def test_it_goes_on_when_the_cable_is_in_again(tmp_path: Path) -> None:
     assert any("lidar 1 (RPLIDAR-C1)" in line for line in report.said)
 
 
+@pytest.mark.thorough
 def test_poor_lines_and_noise_are_borne_and_replayed_bit_by_bit(tmp_path: Path) -> None:
     faults = (LidarFault(lost=0.0005, damaged=0.0005), LidarFault(noise_m=0.03), LidarFault(60.0, 60.3, unplugged=True))
     run = drive(tmp_path, "LD19:yaw=10", "RPLIDAR-A1:yaw=180,x=-0.3", faults=faults, record=True)

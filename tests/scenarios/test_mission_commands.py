@@ -15,6 +15,7 @@ from companion.settings import Settings
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 from sitl.simulator import Simulator
+from tests.support.quick import first_of
 from tests.support.records import recorded
 from tests.support.rig import GATE, GUIDED, HOLD, RTL, Rig, yard
 from tests.support.served import finished, mission_path, process, served
@@ -49,6 +50,7 @@ params = [0]
 """
 
 
+@pytest.mark.thorough
 def test_a_mission_with_commands_under_faults_is_done_once_and_replayed_bit_for_bit(tmp_path: Path) -> None:
     mission = yard(tmp_path, WORKING)
     record = load_record(recorded(tmp_path / "record", mission, faults="commands"))
@@ -101,7 +103,7 @@ def test_a_person_who_takes_over_is_not_disturbed_by_commands(tmp_path: Path) ->
     assert [event.command for event in rig.simulator.commands] == [SPRAYER, SERVO, CAMERA, GRIPPER, SPRAYER]
 
 
-@pytest.mark.parametrize("resumed", [False, True])
+@first_of(1, "resumed", [False, True])
 def test_nothing_is_switched_on_where_a_pilot_has_brought_the_rover(tmp_path: Path, resumed: bool) -> None:
     mission = yard(tmp_path, WORKING.replace("after_s = 1.0", "after_s = 4.0"))
     rig = Rig(mission, state=tmp_path / "state")
@@ -122,7 +124,7 @@ def with_a_relay(simulator: Simulator) -> None:
     simulator.vehicle.parameters.set("RELAY1_PIN", 5.0)
 
 
-@pytest.mark.parametrize("ticks", [0, 1, *(pytest.param(ticks, marks=pytest.mark.thorough) for ticks in (2, 3, 4))])
+@first_of(1, "ticks", range(5))
 def test_killed_round_a_command_it_is_done_once(tmp_path: Path, ticks: int) -> None:
     """The death comes so many ticks after the rover has reached the place."""
     relay = '[[target.command]]\nname = "DO_SET_RELAY"\nparams = [0, 2]\n'
@@ -160,6 +162,7 @@ def test_a_real_patrol_goes_round_and_counts(tmp_path: Path) -> None:
     assert sum(text.startswith("Lap ") for text in one.report.said) == 2
 
 
+@pytest.mark.thorough
 def test_a_patrol_goes_on_until_it_is_ended_and_says_what_was_missed(tmp_path: Path) -> None:
     patrol = '\n[[target]]\nname = "corner"\nfield = [4, 3]\n[patrol]\n'
     rig = Rig(yard(tmp_path, GATE + patrol, sealed=True))

@@ -66,6 +66,7 @@ def test_a_path_that_names_no_file_is_one_line(mission: Path, option: str, path:
     assert (result.exit_code, result.stderr) == (2, f"{path}: is a folder, not a file; add a file's name\n")
 
 
+@pytest.mark.thorough
 def test_a_report_needs_no_record_and_leaves_none(mission: Path, tmp_path: Path) -> None:
     report = tmp_path / "new" / "run.html"
     result = CliRunner().invoke(app, ["drive", str(mission), "--report", str(report)], env={"COLUMNS": "200"})

@@ -25,6 +25,7 @@ from sitl.sensors.range_sensors import SUITES
 from sitl.simulator import Simulator
 from sitl.world.truth import SimStart
 from sitl.world.world import World
+from tests.support.quick import first_of
 from tests.support.sitl_client import HOME, open_ground, ready
 from tests.support.split_vehicle import SplitVehicle
 
@@ -32,7 +33,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize("turning_radius_m", [0.0, 2.0], ids=["skid", "ackermann"])
-@pytest.mark.parametrize("target_m", [(20.0, 0.0), (8.0, -12.0)])
+@first_of(1, "target_m", [(20.0, 0.0), (8.0, -12.0)])
 def test_the_same_autopilot_drives_over_the_interface_as_in_the_simulator(
     turning_radius_m: float, target_m: tuple[float, float]
 ) -> None:
@@ -55,6 +56,7 @@ def test_the_same_autopilot_drives_over_the_interface_as_in_the_simulator(
     assert farthest_m < 0.005
 
 
+@pytest.mark.thorough
 def test_the_companion_drives_a_mission_over_the_interface_by_the_published_lidar() -> None:
     mission = load_mission(ROOT / "missions" / "one-obstacle.toml")
     scenario = scenario_from_mission(mission)

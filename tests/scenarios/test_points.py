@@ -30,6 +30,7 @@ MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 CAMERA = SensorSuite(lidar=Lidar(5.0, -42.5, 0.3, 6.0, rays=5, sectors=18, as_points=True))
 
 
+@pytest.mark.thorough
 def test_the_simulated_camera_drives_round_a_post_and_its_record_is_replayed_the_same(tmp_path: Path) -> None:
     mission = load_mission(MISSIONS / "first-drive" / "post.toml")
     scenario = replace(scenario_from_mission(mission), sensors=CAMERA)

@@ -12,6 +12,7 @@ from companion.executive.mission_progress import TargetStatus
 from companion.mission.mission import Mission
 from companion.safety.reasons import EndReason, PowerReason, WaitReason
 from companion.settings import Settings, parse_settings
+from tests.support.quick import first_of
 from tests.support.rig import ARM, HOLD, SET_MODE, Change, Rig, yard
 from tests.support.stored import POLYGONS, box, stored
 
@@ -78,7 +79,7 @@ class Draining(Rig):
 LOW = [{"percent": 19}, {"percent": 19, "volts": 11.0}, {"percent": -1, "volts": 11.0, "state": 2}]
 
 
-@pytest.mark.parametrize("change", LOW, ids=["charge", "charge and voltage", "the autopilot's own failsafe"])
+@first_of(1, "change", LOW, ids=["charge", "charge and voltage", "the autopilot's own failsafe"])
 def test_a_low_battery_takes_the_rover_back_the_way_it_came(tmp_path: Path, change: dict[str, Any]) -> None:
     rig = Draining(yard(tmp_path, FAR), 9.0, change)
     rig.until(lambda: rig.reason is not None, AFTER_S + 1.5)
@@ -96,6 +97,7 @@ def test_a_low_battery_takes_the_rover_back_the_way_it_came(tmp_path: Path, chan
     assert all(min(math.dist(place, past) for past in before[::5]) < 1.0 for place in rig.track[there + 100 :: 20])
 
 
+@pytest.mark.thorough
 def test_what_was_reached_stays_reached(tmp_path: Path) -> None:
     rig = Draining(yard(tmp_path, FAR), 0.5, {"percent": 100})
     rig.until(lambda: rig.has_reached("gate"))
@@ -114,6 +116,7 @@ def test_a_rally_point_that_is_nearer_is_where_it_goes(tmp_path: Path) -> None:
     assert rig.statuses() == [TargetStatus.SKIPPED] and rig.mode == HOLD
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "why",
     [
@@ -162,7 +165,7 @@ def test_thresholds_in_volts(tmp_path: Path) -> None:
     assert rig.now_s() - rig.began_s >= AFTER_S
 
 
-@pytest.mark.parametrize("change", [{"percent": -1, "volts": 0.0}, {"percent": 0, "volts": 0.0}, {"percent": 20}])
+@first_of(1, "change", [{"percent": -1, "volts": 0.0}, {"percent": 0, "volts": 0.0}, {"percent": 20}])
 def test_what_is_not_known_or_not_low_is_no_reason(tmp_path: Path, change: dict[str, Any]) -> None:
     rig = Draining(yard(tmp_path), 1.0, change)
     rig.finish()
@@ -179,6 +182,7 @@ def test_a_voltage_that_sags_for_a_moment_is_no_reason(tmp_path: Path) -> None:
     assert rig.companion.outcome.complete
 
 
+@pytest.mark.thorough
 def test_with_a_low_battery_it_does_not_even_begin(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path))
     rig.change = battery(percent=12)
@@ -200,7 +204,7 @@ def resumed(rig: Draining, mission: Mission) -> None:
     rig.change = drained
 
 
-@pytest.mark.parametrize("returning", [True, False])
+@first_of(1, "returning", [True, False])
 def test_a_run_that_is_taken_up_out_there_with_a_low_battery_goes_back(tmp_path: Path, returning: bool) -> None:
     mission = yard(tmp_path)
     rig = Draining(mission, 9.0, {"percent": 19}, state=tmp_path / "state", late_s=45.0)

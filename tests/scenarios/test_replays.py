@@ -132,6 +132,7 @@ class Recorded(Rig):
         )
 
 
+@pytest.mark.thorough
 def test_answers_of_a_thread_are_handed_over_when_the_run_had_them(tmp_path: Path) -> None:
     rig = Recorded(tmp_path, yard(tmp_path))
     rig.finish()
@@ -322,6 +323,7 @@ def test_why_shows_the_motions_that_were_judged(tmp_path: Path) -> None:
     assert {TAKEN_COLOUR, CHEAP_COLOUR, UNSEEN_COLOUR, START_COLOUR} <= colours
 
 
+@pytest.mark.thorough
 def test_why_tells_the_seconds_since_the_beginning(copy: Path) -> None:
     time_s = json.loads(load_record(copy).decisions[1])["time_s"]
     ticks, _ = unpacked_ticks((copy / "rounds.bin").read_bytes())

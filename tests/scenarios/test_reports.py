@@ -33,6 +33,7 @@ from companion.viewer.report_tables import tables_of
 from companion.viewer.run_tally import RunTally
 from companion.viewer.wire import tiles_in
 from tests.support.full_disk import full_after
+from tests.support.quick import first_of
 from tests.support.records import START_US, recorded, write_record
 from tests.support.reports import report_data_in
 from tests.support.rig import yard
@@ -71,6 +72,7 @@ def rows_of(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(opened))
 
 
+@pytest.mark.thorough
 def test_the_same_record_gives_the_same_bytes(record: Path, made: Path, tmp_path: Path) -> None:
     again = made_of(record, tmp_path)
     names = sorted(file.relative_to(made) for file in made.rglob("*") if file.is_file())
@@ -206,6 +208,7 @@ def near(found: Counter[tuple[int, ...]], colour: tuple[int, int, int]) -> int:
     return sum(count for one, count in found.items() if all(abs(a - b) < 12 for a, b in zip(one, colour, strict=True)))
 
 
+@pytest.mark.thorough
 def test_a_map_that_is_larger_than_a_look_is_whole_in_the_first_moment_and_in_the_last(
     record: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -221,6 +224,7 @@ def test_a_map_that_is_larger_than_a_look_is_whole_in_the_first_moment_and_in_th
     assert tiles() == (first, last) and len(last) >= len(first) > 3
 
 
+@pytest.mark.thorough
 def test_a_map_that_is_large_is_written_for_other_programs_less_often(
     record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -234,6 +238,7 @@ def test_a_map_that_is_large_is_written_for_other_programs_less_often(
     assert 1 <= maps(tmp_path / "large.mcap") <= 2 < usual
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
 def test_the_film_is_made_by_ffmpeg_too(record: Path, tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["report", str(record), "--mp4", str(tmp_path / "r.mp4")])
@@ -243,7 +248,8 @@ def test_the_film_is_made_by_ffmpeg_too(record: Path, tmp_path: Path) -> None:
     assert not (record / "report.html").exists()
 
 
-@pytest.mark.parametrize(
+@first_of(
+    1,
     ("script", "says"),
     [
         (None, "--mp4: ffmpeg is not installed; install it (apt-get install ffmpeg), or use --gif"),
@@ -350,9 +356,7 @@ def test_what_cannot_be_written_is_one_line_and_no_record_is_harmed(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("option", "place"), [("--out", "r.html"), ("--gif", "r.gif"), ("--mcap", "r.mcap"), ("--csv", "csv")]
-)
+@first_of(2, ("option", "place"), [("--out", "r.html"), ("--gif", "r.gif"), ("--mcap", "r.mcap"), ("--csv", "csv")])
 def test_a_full_disk_leaves_what_was_there_and_nothing_cut(
     record: Path, tmp_path: Path, option: str, place: str
 ) -> None:

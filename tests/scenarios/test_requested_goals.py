@@ -15,6 +15,7 @@ from companion.safety.reasons import RunPhase, WaitReason
 from companion.settings import parse_settings
 from tests.scenarios.test_safety import Frame
 from tests.support.asker import COMPANION, NAN, Asker
+from tests.support.quick import first_of
 from tests.support.rig import MANUAL, yard
 
 ACCEPTED, NOT_NOW, DENIED = 0, 1, 2
@@ -56,7 +57,7 @@ def messages(rig: Asker) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("form", ["zeros", "nans", "long", "item", "old item"])
+@first_of(2, "form", ["zeros", "nans", "long", "item", "old item"])
 def test_every_form_of_a_guided_target_leads_to_the_same_place(driving: Asker, form: str) -> None:
     wanted = messages(driving)
     driving.ask(wanted[form])
@@ -82,7 +83,7 @@ UNSAFE = {
 }
 
 
-@pytest.mark.parametrize(("field", "reason"), UNSAFE.values(), ids=UNSAFE)
+@first_of(2, ("field", "reason"), UNSAFE.values(), ids=UNSAFE)
 def test_a_place_that_is_not_safe_is_refused_with_the_reason(
     tmp_path: Path, field: tuple[int, int], reason: str
 ) -> None:
@@ -157,6 +158,7 @@ def test_nothing_is_accepted_while_the_rover_is_not_driven(tmp_path: Path) -> No
     assert rig.answered() == ACCEPTED
 
 
+@pytest.mark.thorough
 def test_a_repeated_request_changes_nothing(driving: Asker) -> None:
     place = driving.field(5, 12)
     for _ in range(3):
@@ -244,6 +246,7 @@ def low_battery(message: Any) -> Any:
     return message
 
 
+@pytest.mark.thorough
 def test_a_battery_that_runs_low_ends_a_requested_goal(driving: Asker) -> None:
     driving.reposition(driving.field(20, 12))
     assert driving.answered() == ACCEPTED

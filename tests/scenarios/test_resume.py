@@ -20,6 +20,7 @@ from companion.safety.mode_latch import Control
 from companion.safety.reasons import Doubt, WaitReason
 from companion.supervision.arming import LEFT_S
 from tests.scenarios.test_safety_pilot import hold_sticks
+from tests.support.quick import first_of
 from tests.support.rig import ARM, GATE, GUIDED, HOLD, MANUAL, SET_MODE, Rig, Sent, without, yard
 
 TWO = GATE + 'hold_s = 1.0\n[[target]]\nname = "corner"\nfield = [4, 3]\n'
@@ -59,7 +60,7 @@ def goes_on_after_s(rig: Rig, since_s: float) -> float:
     return led()[0] - since_s
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(3, 5))])
+@first_of(1, "seed", range(5))
 def test_killed_at_random_times_it_drives_the_mission_to_its_end(tmp_path: Path, seed: int) -> None:
     rig, mission = rig_of(tmp_path, seed=seed)
     rng = np.random.default_rng(seed)
@@ -114,6 +115,7 @@ def test_map_and_past_path_are_there_again(tmp_path: Path, metres: float) -> Non
     assert any(text.startswith("Resumed with its map, 0 targets reached") for text in rig.texts())
 
 
+@pytest.mark.thorough
 def test_a_requested_goal_is_run_to_its_end_and_then_the_mission(tmp_path: Path) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(3.0)
@@ -145,6 +147,7 @@ def test_a_rover_on_its_way_back_goes_on_back(tmp_path: Path) -> None:
     assert rig.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 def test_the_link_comes_up_and_within_two_seconds_it_drives(tmp_path: Path) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(5.0)
@@ -157,6 +160,7 @@ def test_the_link_comes_up_and_within_two_seconds_it_drives(tmp_path: Path) -> N
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 def test_a_rover_that_cannot_be_driven_again_stands_and_is_left_to_a_person_in_hold(tmp_path: Path) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(5.0)
@@ -175,6 +179,7 @@ def test_a_rover_that_cannot_be_driven_again_stands_and_is_left_to_a_person_in_h
     assert rig.companion.outcome.complete
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("data", ["good", "missing"])
 def test_sticks_that_were_taken_hold_of_while_the_companion_was_dead_take_the_rover(tmp_path: Path, data: str) -> None:
     rig, mission = rig_of(tmp_path)
@@ -221,7 +226,7 @@ def test_after_a_loss_of_power_it_arms_and_goes_on_where_it_was(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("alive", [True, False], ids=["before", "while it is dead"])
-@pytest.mark.parametrize("mode", [MANUAL, pytest.param(HOLD, marks=pytest.mark.thorough)])
+@first_of(1, "mode", [MANUAL, pytest.param(HOLD, marks=pytest.mark.thorough)])
 def test_a_rover_that_a_person_has_taken_stays_with_that_person(tmp_path: Path, mode: int, alive: bool) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(4.0)
@@ -274,6 +279,7 @@ def test_after_an_orderly_stop_it_goes_on_by_itself(tmp_path: Path) -> None:
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 def test_after_an_orderly_stop_a_rover_that_a_person_has_put_away_is_not_armed(tmp_path: Path) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(4.0)

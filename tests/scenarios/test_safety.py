@@ -16,6 +16,7 @@ from companion.mission.load import load_mission
 from companion.navigation.field_step import Action
 from companion.safety.reasons import Doubt, EndReason, LatchReason, RunPhase, WaitReason
 from companion.settings import Settings, parse_settings
+from tests.support.quick import first_of
 from tests.support.rig import ARM, AUTO, GUIDED, HOLD, MANUAL, REBOOT, RTL, SET_MODE, Rig, Sent, without, yard
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
@@ -55,7 +56,7 @@ def assert_silent(rig: Rig, since_s: float) -> None:
 # --- the pilot wins -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
+@first_of(1,
     ("mode", "metres"),
     [
         pytest.param(mode, metres, marks=() if always else pytest.mark.thorough, id=f"{mode}-{metres}")
@@ -170,7 +171,7 @@ def test_armed_in_manual_at_connection_it_waits_for_a_person(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("arm", [False, True])
-@pytest.mark.parametrize("ends", ["HOLD", "disarmed"])
+@first_of(1, "ends", ["HOLD", "disarmed"])
 def test_a_person_who_drives_and_stops_before_the_first_metre_keeps_the_rover(
     tmp_path: Path, ends: str, arm: bool
 ) -> None:
@@ -238,7 +239,7 @@ def test_the_flag_of_a_gps_glitch_alone_does_not_stop_it_as_it_does_not_stop_ard
     assert rig.companion.outcome.complete and not rig.was_stopped
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@first_of(2, "name", FAULTS)
 def test_lost_data_stops_the_rover_and_then_holds(rig: Rig, name: str) -> None:
     change, doubt, figure = FAULTS[name]
     rig.change, broken_s = change, rig.now_s()
@@ -266,7 +267,7 @@ def test_lost_data_stops_the_rover_and_then_holds(rig: Rig, name: str) -> None:
     assert_reached(rig)
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@first_of(2, "name", FAULTS)
 def test_data_that_comes_back_in_time_lets_it_go_on(rig: Rig, name: str) -> None:
     change, doubt, figure = FAULTS[name]
     rig.change = change
@@ -445,7 +446,7 @@ def test_an_autopilot_that_restarts_on_the_way(tmp_path: Path, form: str) -> Non
     assert math.hypot(truth.north_m - 7.5, truth.east_m - 15.5) < 1.5
 
 
-@pytest.mark.parametrize("form", ["global", "mission-item", "reposition"])
+@first_of(1, "form", ["global", "mission-item", "reposition"])
 def test_what_cannot_be_said_stops_the_rover_and_not_the_companion(tmp_path: Path, form: str) -> None:
     rig = Rig(yard(tmp_path), parse_settings({"link": {"setpoint": form}}, "test"))
     rig.until_driven(2.0)
@@ -464,6 +465,7 @@ def test_what_cannot_be_said_stops_the_rover_and_not_the_companion(tmp_path: Pat
 # --- driving --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("form", "kind"),
     [

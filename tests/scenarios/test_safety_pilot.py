@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.navigation.field_step import Part
 from companion.safety.reasons import Doubt, RunPhase, WaitReason
+from tests.support.quick import first_of
 from tests.support.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, Rig, without, yard
 
 HEADING_ONLY, POSITION_ONLY = 2559, 3580
@@ -110,7 +111,7 @@ def assert_setpoints_only_when_ours(rig: Rig) -> None:
     assert all(one.mode == GUIDED and one.armed for one in rig.sent if one.is_setpoint)
 
 
-@pytest.mark.parametrize(("phase", "mode"), list(zip(PHASES, cycle([MANUAL, HOLD]), strict=False)))
+@first_of(3, ("phase", "mode"), list(zip(PHASES, cycle([MANUAL, HOLD]), strict=False)))
 def test_a_mode_change_at_any_phase_silences_it_for_good(tmp_path: Path, phase: str, mode: int) -> None:
     rig = rig_for(phase, tmp_path)
     PHASES[phase](rig)
@@ -122,7 +123,7 @@ def test_a_mode_change_at_any_phase_silences_it_for_good(tmp_path: Path, phase: 
     assert_setpoints_only_when_ours(rig)
 
 
-@pytest.mark.parametrize("phase", ["turning", "driving", "backing out", "stopped by a watchdog", "handing over"])
+@first_of(2, "phase", ["turning", "driving", "backing out", "stopped by a watchdog", "handing over"])
 def test_disarming_at_any_phase_silences_it_for_good(tmp_path: Path, phase: str) -> None:
     rig = rig_for(phase, tmp_path)
     PHASES[phase](rig)
@@ -147,7 +148,8 @@ def hold_sticks(rig: Rig, steering_us: int, throttle_us: int, seconds: float) ->
         rig.run_for(0.2)
 
 
-@pytest.mark.parametrize(
+@first_of(
+    2,
     ("phase", "sticks_us"),
     [
         ("turning", (1700, 1500)),
@@ -190,7 +192,7 @@ def test_sticks_that_tremble_or_are_let_go_take_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("mode", [MANUAL, HOLD])
-@pytest.mark.parametrize("lost", [False, True], ids=["heard", "the heartbeat between is lost"])
+@first_of(1, "lost", [False, True], ids=["heard", "the heartbeat between is lost"])
 def test_a_person_who_changes_the_mode_in_the_tick_in_which_the_companion_does_is_not_overruled(
     tmp_path: Path, mode: int, lost: bool
 ) -> None:
@@ -219,7 +221,7 @@ def test_a_speed_whose_answer_was_lost_is_not_said_again_to_a_rover_that_a_perso
     assert_silent_from_here(rig)
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 5))])
+@first_of(1, "seed", range(5))
 def test_at_any_moment_whatever_the_pilot_does_wins(tmp_path: Path, seed: int) -> None:
     """Lock-step, at random ticks from arming on: mode switch, arming switch, sticks; then it is given back."""
     rig, rng = Rig(yard(tmp_path), seed=seed, late_s=ON_FOR_S), np.random.default_rng([seed, 4711])

@@ -13,6 +13,7 @@ from companion.navigation.step_runner import InlineRunner
 from companion.safety.reasons import Doubt
 from companion.settings import parse_settings
 from sitl.sensors.range_sensors import Defect
+from tests.support.quick import first_of
 from tests.support.rig import HOLD, SET_MODE, Rig, without, yard
 from tests.support.served import finished, mission_path, process, served, wait_until
 
@@ -108,7 +109,7 @@ class Again:
 
 
 @pytest.mark.parametrize("lost", [(), ("TIMESYNC",)])
-@pytest.mark.parametrize(("kind", "name"), [("ATTITUDE", "attitude"), ("LOCAL_POSITION_NED", "position")])
+@first_of(1, ("kind", "name"), [("ATTITUDE", "attitude"), ("LOCAL_POSITION_NED", "position")])
 def test_a_packet_that_comes_again_and_again_is_as_old_as_its_boot_time(
     rig: Rig, kind: str, name: str, lost: tuple[str, ...]
 ) -> None:
@@ -120,7 +121,7 @@ def test_a_packet_that_comes_again_and_again_is_as_old_as_its_boot_time(
     assert modes_asked_for(rig, since_s) == [HOLD]
 
 
-@pytest.mark.parametrize("later_ticks", [0, 4])
+@first_of(1, "later_ticks", [0, 4])
 def test_a_line_that_delivers_everything_twice_does_no_harm(rig: Rig, later_ticks: int) -> None:
     waiting = deque([b""] * later_ticks)
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
@@ -15,6 +16,7 @@ from sitl.scenario import scenario_from_mission
 MISSION = Path(__file__).resolve().parents[2] / "missions" / "one-obstacle.toml"
 
 
+@pytest.mark.thorough
 def test_what_was_mapped_is_known_the_next_time(tmp_path: Path) -> None:
     mission = load_mission(MISSION)
     first = Drive(mission, scenario_from_mission(mission), Settings(), 1, NullRecorder())

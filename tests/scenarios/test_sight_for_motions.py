@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from companion.mission.load import load_mission
 from companion.recording.recorder import NullRecorder
 from companion.settings.settings_file import parse_settings
@@ -15,6 +17,7 @@ MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 WARNING = "guidance.controller: driving with points, not motion-ga: "
 
 
+@pytest.mark.thorough
 def test_a_run_says_that_points_lead_it_and_why() -> None:
     mission = with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "beams")
     settings = parse_settings({"guidance": {"controller": "motion-ga"}}, "here")

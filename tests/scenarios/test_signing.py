@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
@@ -103,6 +104,7 @@ def test_an_autopilot_that_reboots_is_believed_again(tmp_path: Path) -> None:
     assert rig.now_s() - rig.companion.vehicle.heartbeat.time_s < 2.0
 
 
+@pytest.mark.thorough
 def test_a_signed_and_tuned_run_is_replayed_without_the_key(tmp_path: Path) -> None:
     rig = signing_rig(tmp_path / "world")
     mission = rig_mission(tmp_path / "world")

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 CASES = [
     ("drive", "crossing.toml", "vertex++", "points", "64"),
     ("drive", "ackermann.toml", "hybrid", "motion-ga", "66"),  # led by points
@@ -15,6 +17,7 @@ CASES = [
 ]
 
 
+@pytest.mark.thorough
 def test_neither_a_drive_nor_a_vehicle_that_is_served_compiles_anything() -> None:
     """A client that starts the first mission would wait for a compiler, without heartbeats of the vehicle."""
     command = [sys.executable, "-m", "tests.scenarios.compiled_kernels", *map(",".join, CASES)]
@@ -31,6 +34,7 @@ def test_neither_a_drive_nor_a_vehicle_that_is_served_compiles_anything() -> Non
 
 WARM = """
 import sys
+import pytest
 from companion.settings import Settings
 from companion.executive.warm_up import kernels_warm, warm_up
 if sys.argv[1] == "warm":

@@ -125,6 +125,7 @@ class Program:
         return value, compiled
 
 
+@pytest.mark.thorough
 def test_a_kernel_is_compiled_again_only_when_something_it_uses_has_changed(tmp_path: Path) -> None:
     program = Program(tmp_path / "one", tmp_path / "cache")
     assert program.run() == (7.0, ["scaled", "both", "other"])

@@ -126,6 +126,7 @@ def test_an_answer_is_taken_in_the_round_in_which_the_run_took_it(tmp_path: Path
     assert not runner.busy and runner.take() is None
 
 
+@pytest.mark.thorough
 @needs_shared
 def test_a_record_of_the_real_firmware_that_an_older_version_made_is_replayed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its settings have a key that is called otherwise today, and none for the rules that contacts have led to.

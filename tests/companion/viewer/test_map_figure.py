@@ -51,6 +51,7 @@ def test_the_ground_fills_the_page(tmp_path: Path, size: tuple[float, float]) ->
     assert np.ptp(columns) / np.ptp(rows) == pytest.approx(ratio, rel=0.02), "a metre is as long both ways"
 
 
+@pytest.mark.thorough
 def test_a_short_drive_on_a_large_map_fills_its_picture(tmp_path: Path) -> None:
     (tmp_path / "m.toml").write_text(
         '[grid]\nsize = [400, 300]\nhome = [10, 10]\n[[target]]\nfield = [14, 12]\n[sitl]\nsensors = "lidar-360"\n'

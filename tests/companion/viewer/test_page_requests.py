@@ -101,6 +101,7 @@ def test_pause_go_on_send_and_skip_and_the_record_is_replayed(page: Page) -> Non
     assert not result.differences and result.ticks > 100
 
 
+@pytest.mark.thorough
 def test_in_a_drive_that_goes_faster_the_same_delay_is_no_fault(page: Page) -> None:
     page.speedup = 20.0
     page.drives()

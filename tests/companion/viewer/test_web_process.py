@@ -302,6 +302,7 @@ def memory_mb(process: WebProcess) -> float:
     return psutil.Process(process.process_id).memory_info().rss / 1e6
 
 
+@pytest.mark.thorough
 def test_a_flood_of_pings_from_one_who_never_reads_does_not_fill_the_memory(web: WebProcess) -> None:
     before_mb = memory_mb(web)
     ping = bytes([0x89, 0x80 | 125]) + bytes(4) + bytes(125)

@@ -20,6 +20,7 @@ from sitl.sensors.range_sensors import SUITES
 from sitl.world.truth import SimStart
 from sitl.world.world import World
 from tests.support.firmware import Firmware, frame
+from tests.support.quick import first_of
 
 START = SimStart(15.0, 15.0, 0.3, GeoPoint(53.1325, 23.1688))
 FASTEST_M_S = 5.0
@@ -45,7 +46,7 @@ def wrapped(angle_rad: float) -> float:
 
 
 @pytest.mark.parametrize("turning_radius_m", [0.0, 2.0], ids=["skid", "ackermann"])
-@pytest.mark.parametrize(("grip", "walls"), [(1.0, False), (1.0, True), (0.05, True)], ids=["open", "walls", "ice"])
+@first_of(2, ("grip", "walls"), [(1.0, False), (1.0, True), (0.05, True)], ids=["open", "walls", "ice"])
 @settings(max_examples=25, deadline=None)
 @given(orders=orders)
 def test_turn_rate_acceleration_velocity_and_place_fit_together(
