@@ -194,6 +194,7 @@ def fits(shown: Page, size: tuple[int, int]) -> None:
     assert shown.run(OVER_EACH_OTHER) == []
 
 
+@pytest.mark.thorough
 def test_the_simulator_alone_is_shown_as_such(tmp_path: Path) -> None:
     link = f"tcp:127.0.0.1:{free_port()}"
     serve = ("serve", MISSIONS / "depot.toml", "--web", "0", "--listen", link, "--speedup", "2")

@@ -46,6 +46,7 @@ def report():
     return run(Options(runs=3, seed=7), lambda done, total: None)
 
 
+@pytest.mark.thorough
 def test_what_is_shown_is_what_the_planner_finds(report):
     for entry in report.entries:
         planner = make_planner(entry.method, SETTINGS)

@@ -138,7 +138,7 @@ def test_a_mission_of_the_companions_own_is_never_driven_in_auto(tmp_path: Path)
     assert_silent_since(rig, since_s)
 
 
-@pytest.mark.parametrize("limits", [(3.0, 0, 0, 0), (0, 0, 0, 3.0)], ids=["time", "distance"])
+@first_of(1, "limits", [(3.0, 0, 0, 0), (0, 0, 0, 3.0)], ids=["time", "distance"])
 def test_the_limits_of_a_leg_are_the_autopilots(tmp_path: Path, limits: tuple[float, ...]) -> None:
     rows: list[Row] = [(LIMITS, limits, None), (GUIDED_ENABLE, ON, (15, 7)), (WAYPOINT, NONE, (3, 7))]
     rig = in_auto(tmp_path, rows)
@@ -229,7 +229,7 @@ OTHERS = {
 }
 
 
-@first_of(2, "fields", OTHERS.values(), ids=OTHERS)
+@first_of(1, "fields", OTHERS.values(), ids=OTHERS)
 def test_what_is_no_leg_of_ours_is_not_driven(tmp_path: Path, fields: dict[str, int]) -> None:
     rig = in_auto(tmp_path, ROUND_THE_WALL)
     rig.change = Shutdown(rig, **fields)
@@ -241,6 +241,7 @@ def test_what_is_no_leg_of_ours_is_not_driven(tmp_path: Path, fields: dict[str, 
     assert ("lat_int" in fields) == any("not in the mission as it was read" in text for text in rig.texts())
 
 
+@pytest.mark.thorough
 def test_a_leg_that_falls_silent_is_driven_for_two_seconds_and_no_longer(tmp_path: Path) -> None:
     rig = in_leg(tmp_path)
     rig.change = Shutdown(rig, lost_s=1.4)
@@ -255,6 +256,7 @@ def test_a_leg_that_falls_silent_is_driven_for_two_seconds_and_no_longer(tmp_pat
     assert rig.companion.outcome.complete
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("lost", [("MISSION_ITEM_REACHED",), ("MISSION_CURRENT",)])
 def test_either_news_of_its_end_ends_a_leg(tmp_path: Path, lost: tuple[str, ...]) -> None:
     rig = in_auto(tmp_path, ROUND_THE_WALL)
@@ -268,6 +270,7 @@ def test_either_news_of_its_end_ends_a_leg(tmp_path: Path, lost: tuple[str, ...]
     assert rig.companion.outcome.complete
 
 
+@pytest.mark.thorough
 def test_a_small_radius_of_the_autopilots_is_driven_into(tmp_path: Path) -> None:
     """The companion is content half a metre off; the autopilot ends the leg later."""
     rig = in_leg(tmp_path)
@@ -299,6 +302,7 @@ def test_a_companion_that_is_killed_in_a_leg_takes_it_up_again(tmp_path: Path) -
     assert_steered_only_in_the_leg(rig)
 
 
+@pytest.mark.thorough
 def test_a_battery_that_runs_low_in_a_leg_is_the_autopilots_affair(tmp_path: Path) -> None:
     """The companion never turns back inside a leg of AUTO."""
     rig = in_leg(tmp_path)

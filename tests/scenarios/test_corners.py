@@ -85,6 +85,7 @@ def assert_reached(run: Drive) -> None:
     assert run.companion.outcome.complete
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("seed", "jerk_m_s3"), [pytest.param(0, 3.0, marks=pytest.mark.thorough), (FOUND, 0.0)])
 def test_an_eager_rover_comes_round_corners_without_a_contact(seed: int, jerk_m_s3: float) -> None:
     assert_reached(drive(seed, EAGER, jerk_m_s3))

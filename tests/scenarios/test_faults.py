@@ -168,6 +168,7 @@ def test_the_plan_of_a_poor_radio_is_driven_from_the_command_line() -> None:
     assert "outcome: reached" in result.output
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "reached"),
     [

@@ -217,6 +217,7 @@ def test_a_target_that_comes_to_lie_outside_while_nobody_listens_is_given_up_too
     assert max(east for _, east in rig.track) < 12.0 and rig.breaches == 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "when",
     [pytest.param("before the requested goal", marks=pytest.mark.thorough), "during the requested goal"],
@@ -254,7 +255,7 @@ def test_a_fence_that_leaves_the_rover_outside_stops_it(tmp_path: Path) -> None:
     assert rig.speed_m_s == pytest.approx(0.0, abs=0.05)
 
 
-@pytest.mark.parametrize("action", [1, 2], ids=["RTL", "HOLD"])
+@first_of(1, "action", [1, 2], ids=["RTL", "HOLD"])
 def test_a_breach_that_the_autopilot_acts_on_silences_the_companion(tmp_path: Path, action: int) -> None:
     rig = driven(tmp_path, stored(ALL, **POLYGONS, FENCE_ACTION=float(action)))
     rig.until_driven(3.0)

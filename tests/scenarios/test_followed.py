@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from companion.operator.notifications import NOT_FOLLOWED_S
 from tests.support.rig import GATE, GUIDED, HOLD, Rig, yard
 
@@ -25,6 +27,7 @@ def test_a_target_that_is_not_taken_is_told_of(tmp_path: Path) -> None:
     assert rig.texts().count(ANOTHER) == 1
 
 
+@pytest.mark.thorough
 def test_nothing_is_said_of_targets_while_somebody_else_has_the_rover(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path), late_s=45.0)
     rig.until_driven(2.0)

@@ -131,6 +131,7 @@ def test_it_does_not_even_arm_before_the_fix_is_good_enough(tmp_path: Path) -> N
     assert rig.companion.outcome.complete and [one for one in rig.sent if one.command == ARM]
 
 
+@pytest.mark.thorough
 def test_a_companion_that_is_killed_below_the_gate_stands_again_and_goes_on_by_itself(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     rig = Rig(mission, GATED, state=tmp_path / "state")
@@ -218,6 +219,7 @@ def test_with_the_gate_it_stands_while_the_fix_is_poor_and_the_map_follows_both_
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 def test_a_step_that_is_too_far_makes_the_map_begin_anew(tmp_path: Path) -> None:
     rig = stepped(tmp_path, fix_fault(2.5))
     rig.until(lambda: rig.gave(Doubt.POSITION_WANDERED) or rig.gave(Doubt.POSITION_JUMPED), 10.0)
@@ -226,6 +228,7 @@ def test_a_step_that_is_too_far_makes_the_map_begin_anew(tmp_path: Path) -> None
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 def test_a_fix_that_is_not_told_is_a_gate_that_shuts(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path), GATED, faults=(GpsFixUntold(2.0, 8.0, "driving"),))
     rig.finish()

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from companion.recording.recorder import unused
 from sitl.cli.commands import app
 from tests.support.full_disk import full_after
+from tests.support.quick import first_of
 from tests.support.reports import report_data_in
 
 YARD = "[grid]\nsize = [20, 20]\nhome = [3, 3]\n[sitl]\nsensors = 'lidar-360'\n[[target]]\nfield = [6, 3]\n"
@@ -28,6 +29,7 @@ def mission(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.thorough
 def test_a_full_disk_is_one_line_for_each_file_and_keeps_the_others(mission: Path, tmp_path: Path) -> None:
     for name in ("run.png", "seen.pgm.new"):
         (tmp_path / name).symlink_to("/dev/full")
@@ -40,6 +42,7 @@ def test_a_full_disk_is_one_line_for_each_file_and_keeps_the_others(mission: Pat
     assert json.loads(figures.read_text())["outcome"] == "reached"
 
 
+@pytest.mark.thorough
 def test_a_disk_that_gets_full_leaves_the_old_files_and_nothing_cut(mission: Path, tmp_path: Path) -> None:
     image, figures = tmp_path / "run.png", tmp_path / "run.json"
     for old in (image, figures):
@@ -52,7 +55,7 @@ def test_a_disk_that_gets_full_leaves_the_old_files_and_nothing_cut(mission: Pat
     assert image.read_text() == figures.read_text() == "old"
 
 
-@pytest.mark.parametrize("command", [["drive", "--json"], ["physics", "--port", "1", "--write-params"]])
+@first_of(1, "command", [["drive", "--json"], ["physics", "--port", "1", "--write-params"]])
 def test_a_full_disk_is_one_line(mission: Path, command: list[str]) -> None:
     result = CliRunner().invoke(app, [*command, "/dev/full", str(mission)])
     assert (result.exit_code, result.stderr) == (5 if command[0] == "drive" else 2, f"/dev/full: {FULL}\n")
@@ -84,6 +87,7 @@ def test_a_report_needs_no_record_and_leaves_none(mission: Path, tmp_path: Path)
     assert report_data_in(report) == told, "it is as it was"
 
 
+@pytest.mark.thorough
 def test_a_standard_output_that_is_full_is_one_line(mission: Path) -> None:
     code = "from sitl.cli.main import main; main()"
     with Path("/dev/full").open("wb") as full:

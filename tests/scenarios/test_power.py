@@ -139,7 +139,7 @@ def test_a_rally_point_that_will_not_do_is_passed_over(tmp_path: Path, why: str)
     assert math.hypot(*rig.place) < 1.0
 
 
-@pytest.mark.parametrize("change", [{"percent": 9}, {"percent": 50, "volts": 10.0, "state": 3}])
+@first_of(1, "change", [{"percent": 9}, {"percent": 50, "volts": 10.0, "state": 3}])
 def test_an_empty_battery_stops_it_where_it_is(tmp_path: Path, change: dict[str, Any]) -> None:
     rig = Draining(yard(tmp_path), 6.0, change)
     rig.until(lambda: rig.mode == HOLD, AFTER_S + 3.0)
@@ -204,7 +204,8 @@ def resumed(rig: Draining, mission: Mission) -> None:
     rig.change = drained
 
 
-@first_of(1, "returning", [True, False])
+@pytest.mark.thorough
+@pytest.mark.parametrize("returning", [True, False])
 def test_a_run_that_is_taken_up_out_there_with_a_low_battery_goes_back(tmp_path: Path, returning: bool) -> None:
     mission = yard(tmp_path)
     rig = Draining(mission, 9.0, {"percent": 19}, state=tmp_path / "state", late_s=45.0)

@@ -28,6 +28,7 @@ from companion.recording.record_format import CHECKED_TICK, packed_tick, run_sum
 from companion.recording.recorder import Recorder
 from companion.replay.replay import replay
 from sitl.cli.commands import app as sitl_app
+from tests.support.quick import first_of
 from tests.support.records import recorded, unclosed, with_meta
 from tests.support.rig import Rig, kept_in, yard
 from tests.support.served import finished, process
@@ -67,6 +68,7 @@ sys.addaudithook(hook)
 """
 
 
+@pytest.mark.thorough
 def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) -> None:
     with process("companion", "replay", record, first=NO_SOCKETS) as child:
         code, out, err = finished(child)
@@ -149,6 +151,7 @@ def test_answers_of_a_thread_are_handed_over_when_the_run_had_them(tmp_path: Pat
     assert any("recorded decisions are missing" in line for line in result.differences)
 
 
+@pytest.mark.thorough
 def test_a_run_that_took_up_another_is_replayed_from_the_copy_of_its_state(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     rig = Recorded(tmp_path, mission)
@@ -176,7 +179,7 @@ def test_a_run_that_could_not_save_its_state_is_replayed(tmp_path: Path) -> None
     assert_same(rig.place)
 
 
-@pytest.mark.parametrize("way_out", ["stop", "error"])
+@first_of(1, "way_out", ["stop", "error"])
 def test_the_way_out_is_replayed_too(tmp_path: Path, way_out: str, monkeypatch: pytest.MonkeyPatch) -> None:
     rig = Recorded(tmp_path, yard(tmp_path))
     rig.until_driven(2.0)
@@ -192,6 +195,7 @@ def test_the_way_out_is_replayed_too(tmp_path: Path, way_out: str, monkeypatch: 
     assert result.companion is not None and result.companion.done
 
 
+@pytest.mark.thorough
 def test_a_run_that_was_otherwise_differs(copy: Path) -> None:
     meta = json.loads((copy / "meta.json").read_text())
     with_meta("arm", False)(copy)
@@ -242,6 +246,7 @@ def test_a_decision_that_a_cut_record_does_not_reach_is_not_explained(record: Pa
     assert result.exit_code == 2 and f"ends before decision {last}" in result.output
 
 
+@pytest.mark.thorough
 def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
     lines = load_record(record).decisions
     number = 1 + next(i for i, line in enumerate(lines) if i and json.loads(line)["searches"])
@@ -260,6 +265,7 @@ def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
     assert late.exit_code == 2 and "the last one is" in late.output
 
 
+@pytest.mark.thorough
 def test_decisions_are_listed_so_that_one_can_be_chosen(copy: Path) -> None:
     contact = {"time_s": 55.0, "north_m": 0.0, "east_m": 4.0, "speed_m_s": 0.5, "with": "a post"}
     (copy / "collisions.json").write_text(json.dumps([contact]))
@@ -280,6 +286,7 @@ def test_decisions_are_listed_so_that_one_can_be_chosen(copy: Path) -> None:
     assert any(line.endswith("- Reached gate") for line in lines) and lines[-2] == "differences: none"
 
 
+@pytest.mark.thorough
 def test_why_takes_a_moment_and_shows_the_decision_in_force(record: Path, tmp_path: Path) -> None:
     listed = CliRunner().invoke(app, ["replay", str(record), "--list"]).output.splitlines()
     number, of_day, after_s = next(line.split()[:3] for line in listed if line.split()[:1] == ["7"])

@@ -271,6 +271,7 @@ def test_an_ffmpeg_that_is_missing_or_gives_up_is_one_line(
     assert result.exit_code == 2 and f"{says}" in result.output and result.output.count("\n") == 1
 
 
+@pytest.mark.thorough
 def test_where_there_is_no_browser_open_says_what_to_open(
     record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -295,6 +296,7 @@ duration_s = 1.6
 """
 
 
+@pytest.mark.thorough
 def test_several_records_are_compared_in_figures(record: Path, tmp_path: Path) -> None:
     (tmp_path / "silent.toml").write_text(SILENT)
     other = recorded(tmp_path / "other", yard(tmp_path), tmp_path / "silent.toml")
@@ -323,6 +325,7 @@ def data_in(file: Path) -> dict[str, Any]:
     return data
 
 
+@pytest.mark.thorough
 def test_the_energy_is_what_the_autopilot_says_it_was(record: Path) -> None:
     energy = counted(load_record(record)).tally.energy
     consumed = [
@@ -356,7 +359,7 @@ def test_what_cannot_be_written_is_one_line_and_no_record_is_harmed(
     assert list(tmp_path.iterdir()) == []
 
 
-@first_of(2, ("option", "place"), [("--out", "r.html"), ("--gif", "r.gif"), ("--mcap", "r.mcap"), ("--csv", "csv")])
+@first_of(1, ("option", "place"), [("--out", "r.html"), ("--gif", "r.gif"), ("--mcap", "r.mcap"), ("--csv", "csv")])
 def test_a_full_disk_leaves_what_was_there_and_nothing_cut(
     record: Path, tmp_path: Path, option: str, place: str
 ) -> None:

@@ -179,6 +179,7 @@ def test_a_repeated_request_changes_nothing(driving: Asker) -> None:
     assert driving.companion.outcome.complete
 
 
+@pytest.mark.thorough
 def test_the_newest_request_counts(driving: Asker) -> None:
     driving.reposition(driving.field(5, 12))
     assert driving.answered() == ACCEPTED

@@ -81,6 +81,7 @@ def test_killed_at_random_times_it_drives_the_mission_to_its_end(tmp_path: Path,
     assert state_in(tmp_path).ended and state_in(tmp_path).reached == 2
 
 
+@pytest.mark.thorough
 def test_the_same_kill_gives_the_same_run(tmp_path: Path) -> None:
     commands = []
     for name in ("one", "two"):
@@ -266,6 +267,7 @@ def test_a_rover_disarmed_by_a_person_is_not_armed_after_a_restart(tmp_path: Pat
     assert rig.companion.outcome.complete
 
 
+@pytest.mark.thorough
 def test_after_an_orderly_stop_it_goes_on_by_itself(tmp_path: Path) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(4.0)
@@ -332,6 +334,7 @@ def test_a_jump_of_the_position_is_not_survived_by_the_map(tmp_path: Path) -> No
     assert evidence is not None and not (evidence.log_odds[56:80, 64:72] >= 0.6).any(), "the wall where it was before"
 
 
+@pytest.mark.thorough
 def test_a_disk_that_fails_is_told_once_and_the_mission_goes_on(tmp_path: Path) -> None:
     rig, _ = rig_of(tmp_path)
     rig.until_driven(2.0)

@@ -16,6 +16,7 @@ from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
 from companion.recording.reader import load_record
 from companion.replay.replay import replay
+from tests.support.quick import first_of
 from tests.support.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, yard
 from tests.support.served import PATIENCE_S, Stopwatch, finished, mission_path, process, served, wait_until
 
@@ -123,9 +124,7 @@ def test_a_peer_that_is_not_there_is_waited_for_until_ctrl_c(tmp_path: Path) -> 
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize(
-    "number", [signal.SIGTERM, signal.SIGINT, pytest.param(signal.SIGHUP, marks=pytest.mark.thorough)]
-)
+@first_of(1, "number", [signal.SIGTERM, signal.SIGINT, pytest.param(signal.SIGHUP, marks=pytest.mark.thorough)])
 @pytest.mark.slow
 def test_a_signal_while_driving_stops_the_rover(tmp_path: Path, number: signal.Signals) -> None:
     mission = yard(tmp_path)

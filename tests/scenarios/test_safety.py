@@ -267,7 +267,7 @@ def test_lost_data_stops_the_rover_and_then_holds(rig: Rig, name: str) -> None:
     assert_reached(rig)
 
 
-@first_of(2, "name", FAULTS)
+@first_of(1, "name", FAULTS)
 def test_data_that_comes_back_in_time_lets_it_go_on(rig: Rig, name: str) -> None:
     change, doubt, figure = FAULTS[name]
     rig.change = change
@@ -289,6 +289,7 @@ def test_stop_and_hold_are_said_once_with_their_reason_and_not_at_every_tick(rig
     assert said[:2] == [f"Stopping: {reason}", f"HOLD: {reason}"] and len(said) <= 6
 
 
+@pytest.mark.thorough
 def test_a_rover_whose_link_fails_stops_on_ground_it_has_seen(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path))
     for metres in (1.0, 4.0, 8.0):
@@ -347,6 +348,7 @@ def test_a_position_jump_is_noticed_and_the_map_forgotten(tmp_path: Path) -> Non
     assert_setpoints_only_when_ours(rig.sent)
 
 
+@pytest.mark.thorough
 def test_no_target_is_given_up_while_a_position_that_jumped_may_jump_back(tmp_path: Path) -> None:
     """Eight seconds of a false position, by which the wall stands where the target is."""
     rig = Rig(yard(tmp_path, '[[target]]\nname = "gate"\nfield = [14, 7]\n'), late_s=45.0)
@@ -483,6 +485,7 @@ def test_every_form_of_setpoint_drives(form: str, kind: str) -> None:
     assert others == set()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name",
     ["clutter.toml", *(pytest.param(f"{name}.toml", marks=pytest.mark.thorough) for name in ("one-obstacle", "rooms"))],

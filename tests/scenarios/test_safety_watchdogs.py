@@ -237,7 +237,7 @@ def test_a_companion_that_is_too_slow_stops_the_rover_and_ends_in_hold(rig: Rig)
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
 
 
-@pytest.mark.parametrize(("done_after_s", "held"), [(1.0, False), (3.0, True)])
+@first_of(1, ("done_after_s", "held"), [(1.0, False), (3.0, True)])
 def test_a_step_that_does_not_end_stops_the_rover(
     tmp_path: Path, done_after_s: float, held: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -282,6 +282,7 @@ def test_a_position_that_slides_away_once_makes_the_map_begin_anew(rig: Rig) -> 
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 def test_a_position_that_wanders_on_and_on_ends_in_hold(rig: Rig) -> None:
     rig.change, since_s = Wandering(rig, 0.6, 4.0), rig.now_s()
     rig.until(lambda: bool(modes_asked_for(rig, since_s)), 25.0)

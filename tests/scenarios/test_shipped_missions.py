@@ -42,6 +42,7 @@ def driven(name: str, suite: str | None = None, seed: int = 0, settings: Setting
     return report
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "suite"),
     [

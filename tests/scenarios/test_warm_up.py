@@ -43,6 +43,7 @@ print(kernels_warm(Settings()))
 """
 
 
+@pytest.mark.thorough
 def test_it_is_known_whether_the_kernels_are_warm_and_asking_compiles_nothing(tmp_path: Path) -> None:
     for place, told in ((tmp_path / "new", "False"), (None, "True")):
         command = [sys.executable, "-c", WARM, "cold" if place else "warm"]

@@ -14,7 +14,6 @@ from companion.cli.replay_progress import watched_replay
 from companion.recording.reader import load_record
 from companion.recording.record_clock import record_clock
 from companion.replay.replay import replay
-from tests.support.quick import first_of
 from tests.support.records import recorded
 from tests.support.rig import yard
 
@@ -25,7 +24,8 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recorded(folder / "record", yard(folder))
 
 
-@first_of(1, "terminal", [True, False])
+@pytest.mark.thorough
+@pytest.mark.parametrize("terminal", [True, False])
 def test_it_is_drawn_on_a_terminal_only_and_changes_nothing(
     record: Path, terminal: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,6 +17,7 @@ from sitl.autopilot.commands import HANDLERS as COMMANDS
 from sitl.autopilot.framing import Framer, packet_size
 from sitl.simulator import Simulator
 from tests.support.party import Party
+from tests.support.quick import first_of
 from tests.support.sitl_client import open_ground
 
 GUIDED, RETURN, REPOSITION = 15, 20, 192
@@ -180,7 +181,7 @@ def test_packets_are_found_in_any_pieces(noise: bytes, cuts: list[int]) -> None:
     assert [packet_size(packet, 0) for packet in found] == [len(packet) for packet in COMMAND_PACKETS]
 
 
-@pytest.mark.parametrize("kind", ["random", "beginnings", "old beginnings", "long headers", "empty packets"])
+@first_of(2, "kind", ["random", "beginnings", "old beginnings", "long headers", "empty packets"])
 def test_a_flood_of_a_megabyte_is_survived(driving: Driving, kind: str) -> None:
     pattern = {
         "random": np.random.default_rng(1).bytes(1_000_000),
@@ -293,7 +294,7 @@ def test_edges_of_everything_there_is() -> None:
     assert driving.alive()
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, 3.4e38, -3.4e38])
+@first_of(1, "value", [0.0, -1.0, 3.4e38, -3.4e38])
 def test_every_parameter_alone_at_an_extreme(value: float) -> None:
     driving = Driving()
     defaults = driving.simulator._vehicle.parameters.as_dict()
@@ -318,7 +319,7 @@ def test_a_system_id_that_does_not_exist(value: float, system: int) -> None:
     assert {m.get_srcSystem() for m in client.heard(5.0)} == {system}
 
 
-@pytest.mark.parametrize("seed", range(3))
+@first_of(1, "seed", range(3))
 def test_absurd_parameters_and_reboots(seed: int) -> None:
     rng = np.random.default_rng(seed)
     driving = Driving()

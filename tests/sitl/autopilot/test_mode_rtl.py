@@ -112,6 +112,7 @@ def test_smart_rtl_needs_a_path() -> None:
     assert client.set_mode(12) == FAILED
 
 
+@pytest.mark.thorough
 def test_a_long_crooked_drive_keeps_a_path_of_limited_length() -> None:
     simulator = open_ground(parameters={"SRTL_POINTS": 40, "SRTL_ACCURACY": 1.0})
     client = ready(simulator)

@@ -1,6 +1,7 @@
 """The experiment on control points that adapt, on a small scale."""
 
 import numpy as np
+import pytest
 
 from sitl.experiments.adaptive_control_points import EPOCHS, WAYS, Entry, Search, run
 from sitl.experiments.experiment import Options
@@ -15,6 +16,7 @@ def test_every_way_spends_the_same_epochs_at_most():
     assert {way.budget.max_epochs * len(way.budget.control_points) for way in WAYS.values()} == {EPOCHS}
 
 
+@pytest.mark.thorough
 def test_it_repeats_and_writes_its_part_of_the_docs(tmp_path):
     reports = [run(Options(runs=4, seed=5), lambda done, total: None) for _ in range(2)]
     results = [report.as_json()["results"] for report in reports]

@@ -26,6 +26,7 @@ def test_the_gap_is_as_wide_as_it_says(width_m: float, angle_deg: float) -> None
         assert world.clearance_m(*there, 2.0) < FINE_M, "the wall goes on"
 
 
+@pytest.mark.thorough
 def test_a_rover_off_its_model_drives_through_a_gate_a_little_wider_than_it_is() -> None:
     """0.15 m on each side, less what a sector of 5 degrees makes of the ends of walls."""
     one = drive("motion-ga", 1.0, 60.0, 0)

@@ -207,6 +207,7 @@ def test_success_of_single_attempts(name, least):
     assert found > more_than(SEEDS, least)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", OBSTACLES)
 def test_success_with_the_papers_five_attempts(name):
     """So many of 200 seeds that a success rate of 95 % or less would show it once in 1000 times."""
