@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -270,6 +271,22 @@ def wanted_kinematics(
         raise TurningError(f"--turning-radius-m: {name} does not heed it; {' and '.join(able)} do")
     heading_rad = None if heading_deg is None else math.remainder(math.radians(90.0 - heading_deg), 2.0 * math.pi)
     return KinematicConstraints(heading_rad, grid.fields(radius_m))
+
+
+def plan_command(problem: PlanningProblem, resolution_m: float, settings: Settings, stem: Path) -> str:
+    """What plans this problem; its map is ``stem``.yaml. Obstacles that move are left out.
+
+    Raises UnknownPlannerError.
+    """
+    planner = settings.navigator.planner
+    (x, y), (to_x, to_y), how = problem.start, problem.target, problem.kinematics
+    turning = ""
+    if how.turning_radius_fields > 0.0 and make_planner(planner, settings.planner).capabilities.turning_radius:
+        turning = f" --turning-radius-m {how.turning_radius_fields * resolution_m:g}"
+        heading_rad = how.heading_rad
+        turning += "" if heading_rad is None else f" --heading-deg {90.0 - math.degrees(heading_rad):g}"
+    ends = f"--start {x},{y} --target {to_x},{to_y}"
+    return f"rover-companion plan {shlex.quote(f'{stem}.yaml')} {ends} --planner {shlex.quote(planner)}{turning}"
 
 
 def place_of(option: str, text: str, grid: Grid, top_left: bool) -> Cell:
