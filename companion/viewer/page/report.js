@@ -74,6 +74,7 @@ class ReportPage {
   }
 
   drawExtras() {
+    this.view.besides.push(() => (this.choosing ? [] : this.others.places()));
     // Candidates and other records together would be a tangle of lines.
     this.view.below.push((pen) => {
       if (!this.choosing) this.others.drawTracks(pen);
