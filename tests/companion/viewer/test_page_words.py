@@ -1,4 +1,4 @@
-"""Lists of the page that are cut, and the map that shows everything: nothing is left out without a word."""
+"""What the page tells in words: what a list leaves out, and what is waited for before there is a map."""
 
 from __future__ import annotations
 
@@ -107,3 +107,29 @@ const [norths, easts] = [0, 1].map((axis) => places.map((place) => place[axis]))
 tell([Math.min(...norths), Math.max(...norths), Math.min(...easts), Math.max(...easts)]);
 """
     assert ran(tmp_path, DOCUMENT + script) == [-70, 999, -999, 1998]
+
+
+def test_before_the_autopilot_is_heard_the_page_says_what_it_waits_for(tmp_path: Path) -> None:
+    script = """
+const { Headline } = await import("./headline.js");
+const { drawNothingYet } = await import("./layer_frame.js");
+const headline = new Headline();
+const frame = { state: "connecting", line: "waiting for the autopilot's heartbeat on udpin:0.0.0.0:14550", t: 1 };
+const heads = [[null, false], [null, true], [frame, true]].map(([moment, open]) => {
+  headline.show(null, moment, "", open);
+  return headline.line.textContent;
+});
+const drawn = (model) => {
+  const texts = [];
+  const context = { beginPath() {}, roundRect() {}, fill() {} };
+  const camera = { width: 400, height: 300, coveredRight: 60, covered: 0 };
+  const pen = { context, camera, colours: {}, widthOf: () => 100, text: (text) => texts.push(text) };
+  drawNothingYet(pen, { map: {}, scene: {}, ...model });
+  return texts;
+};
+tell([heads, drawn({ frame }), drawn({ frame: { pose: [0, 0, 0] } }), drawn({ frame, map: { shape: {} } })]);
+"""
+    heads, before, placed, mapped = ran(tmp_path, DOCUMENT + script)
+    assert heads[:2] == ["Connecting", "Waiting for the run to begin"]
+    assert heads[2] == "Waiting for the autopilot's heartbeat on udpin:0.0.0.0:14550"
+    assert before == ["No position of the rover yet", "The map begins with it"] and placed == mapped == []
