@@ -124,12 +124,19 @@ export class Decisions {
     );
   }
 
-  /** Draws the candidates; the one taken is strong, the one under the mouse, too. */
-  draw(pen) {
+  /** The candidates on the map; the one taken is strong, the one under the mouse, too. */
+  drawLines(pen) {
+    for (const i of this.order()) this.drawLine(pen, this.shown.candidates[i], i);
+  }
+
+  drawCosts(pen) {
+    // The one taken has the first choice.
+    for (const i of this.order().reverse()) this.drawCost(pen, this.shown.candidates[i], i);
+  }
+
+  order() {
     const candidates = this.shown?.candidates ?? [];
-    const order = candidates.map((_, i) => i).sort((a, b) => candidates[a].taken - candidates[b].taken);
-    for (const i of order) this.drawLine(pen, candidates[i], i);
-    for (const i of order.reverse()) this.drawCost(pen, candidates[i], i); // the one taken has the first choice
+    return candidates.map((_, i) => i).sort((a, b) => candidates[a].taken - candidates[b].taken);
   }
 
   drawLine(pen, { cells, curve, taken }, i) {

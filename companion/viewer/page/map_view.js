@@ -15,8 +15,9 @@ export class MapView {
   constructor(canvas, model, camera) {
     Object.assign(this, { canvas, model, camera, waiting: false });
     this.context = canvas.getContext("2d", { alpha: false });
-    /** Functions (pen) of other modules, drawn below or above the rover. */
+    /** Functions (pen) of other modules, drawn below the track, below the marks and their names, or above. */
     this.below = [];
+    this.between = [];
     this.above = [];
     /** Functions of other modules that give more places which "fit" keeps in view. */
     this.besides = [];
@@ -69,6 +70,7 @@ export class MapView {
     camera.screen(context);
     if (frame) drawRays(pen, frame);
     if (frame) drawAhead(pen, frame);
+    for (const layer of this.between) layer(pen);
     drawMarks(pen, model.scene, frame);
     if (frame) drawMovers(pen, frame);
     for (const layer of this.above) layer(pen);

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tests.support.page_script import needs_node, ran
 
 pytestmark = needs_node
@@ -133,3 +135,11 @@ tell([heads, drawn({ frame }), drawn({ frame: { pose: [0, 0, 0] } }), drawn({ fr
     assert heads[:2] == ["Connecting", "Waiting for the run to begin"]
     assert heads[2] == "Waiting for the autopilot's heartbeat on udpin:0.0.0.0:14550"
     assert before == ["No position of the rover yet", "The map begins with it"] and placed == mapped == []
+
+
+def test_marks_that_would_cover_each_other_are_smaller(tmp_path: Path) -> None:
+    script = """
+const { radii } = await import("./layer_marks.js");
+tell(radii([[100, 50], [0, 0], [116, 50], [100, 50.5], [100, 200], [110, 218]]));
+"""
+    assert ran(tmp_path, DOCUMENT + script) == [6, 12, 7, 6, pytest.approx(9.3, abs=0.1), pytest.approx(9.3, abs=0.1)]
