@@ -12,7 +12,7 @@ from companion.bench.cases import PAPER_MAPS, Case
 from companion.bench.contestants import Contestant
 from companion.bench.measure import Entry, Limits
 from companion.bench.report import head, rows, runs_explained, where
-from companion.storage.files import refuse_pipe
+from companion.storage.files import refuse_pipe, whole_file
 
 PICTURE = "benchmarks.png"
 
@@ -25,7 +25,8 @@ def write_page(
     picture.parent.mkdir(parents=True, exist_ok=True)
     for file in (page, picture):
         refuse_pipe(file)
-    page.write_text(_page(command, entries, contestants, cases, limits), encoding="utf-8")
+    with whole_file(page) as new:
+        new.write_text(_page(command, entries, contestants, cases, limits), encoding="utf-8")
     plot(picture, entries, contestants)
     return [page, picture]
 
@@ -124,4 +125,5 @@ def plot(file: Path, entries: list[Entry], contestants: list[Contestant]) -> Non
     own_handles = [(h, label) for h, label in zip(handles, labels, strict=True) if label in ours]
     if own_handles:
         figure.legend(*zip(*own_handles, strict=True), loc="outside right upper", frameon=False, fontsize=8)
-    figure.savefig(file, metadata={"Software": None})
+    with whole_file(file) as new:
+        figure.savefig(new, metadata={"Software": None})

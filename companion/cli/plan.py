@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+import shlex
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -19,10 +20,12 @@ from companion.cli.images import save_plan
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, picture, usable_settings
 from companion.core.clock import stopwatch_s
 from companion.core.grid import Cell, Grid, inflated
+from companion.core.own_parts import OwnKind, OwnPartError, blamed
 from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
 from companion.planning.problem import KinematicConstraints, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.problem import Path as GridPath
+from companion.planning.raster import FAULTS, PathFault, cells_cost, first_fault, plain
 from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
 from companion.settings import Settings, SettingsError
 from companion.settings.versions import made_with
@@ -51,7 +54,10 @@ STATUS_WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The result of a search, and its input. ``kinematics``: how the rover turns."""
+    """The result of a search, and its input. ``kinematics``: how the rover turns.
+
+    The cost of its path is computed here; ``told_cost`` is what the planner said, None where that is the same.
+    """
 
     result: PlanResult
     seconds: float
@@ -60,6 +66,7 @@ class Answer:
     grid: Grid
     kinematics: KinematicConstraints
     settings: Settings
+    told_cost: float | None = None
 
     @property
     def tight(self) -> NDArray[np.float64]:
@@ -105,6 +112,7 @@ def as_text(answer: Answer) -> str:
             "status": result.status.value,
             "planner": result.planner,
             "cost": path.cost if path else None,
+            "wrong_cost_of_planner": answer.told_cost,
             "length_fields": path.length_fields if path else None,
             "length_m": path.length_fields * answer.grid.resolution_m if path else None,
             "curve_length_fields": None if curve is None else length_of(curve),
@@ -146,7 +154,10 @@ def _lengths(answer: Answer, path: GridPath) -> dict[str, str]:
         return f"{fields:.2f} fields, {fields * resolution_m:.2f} m"
 
     line = line_of(path)
-    rows = {"cost": f"{path.cost:.3f}", "from field to field": both(path.length_fields)}
+    rows = {"cost": f"{path.cost:.3f}"}
+    if answer.told_cost is not None:
+        rows["planner's cost"] = f"{answer.told_cost:.3f}, wrong: check-planner tells more"
+    rows["from field to field"] = both(path.length_fields)
     rows["line to drive"] = both(length_of(line)) if path.curve is not None else "the same: through the fields' middles"
     bend_m = _bend_m(answer, path)
     radius_m = answer.kinematics.turning_radius_fields * resolution_m
@@ -228,7 +239,7 @@ def plan(
         if image is not None:
             title = f"{map_file.name}, planned by {answer.result.planner}: {STATUS_WORDS[answer.result.status]}"
             save_plan(image, grid, (problem.start, problem.target), answer.result.path, answer.tight, title)
-    except (SettingsError, MapError, PlaceError, TurningError, UnknownPlannerError, OutputError) as error:
+    except (SettingsError, MapError, PlaceError, TurningError, UnknownPlannerError, OwnPartError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     typer.echo(as_text(answer)) if as_json else Console().print(as_table(answer))
@@ -246,13 +257,35 @@ def _ground(map_file: Path, resolution_m: float | None, radius_m: float) -> Grid
 
 
 def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, seed: int, top_left: bool) -> Answer:
-    """Plan with the budget of a thorough search; the time excludes compiling. Raises UnknownPlannerError."""
+    """Plan with the budget of a thorough search; the time excludes compiling.
+
+    Raises UnknownPlannerError, and OwnPartError for a planner of one's own that fails or gives a path that is none.
+    """
     chosen = make_planner(name, settings.planner)
     with Console(stderr=True).status("compiling (once a machine) ..."):
         warm_up((name,), settings.planner)
     began_s = stopwatch_s()
-    result = chosen.plan(problem, budget_of(settings.navigator.thorough), np.random.default_rng(seed))
-    return Answer(result, stopwatch_s() - began_s, seed, top_left, grid, problem.kinematics, settings)
+    with blamed(OwnKind.PLANNER, name):
+        result = chosen.plan(problem, budget_of(settings.navigator.thorough), np.random.default_rng(seed))
+    seconds, told = stopwatch_s() - began_s, None
+    if (path := result.path) is not None:
+        cost = _true_cost(path, problem, name)
+        told = None if math.isclose(path.cost, cost, rel_tol=1e-9, abs_tol=1e-12) else path.cost
+        result = replace(result, path=GridPath(path.cell_array, cost, path.curve, path.speeds_fields_s))
+    return Answer(result, seconds, seed, top_left, grid, problem.kinematics, settings, told)
+
+
+def _true_cost(path: GridPath, problem: PlanningProblem, name: str) -> float:
+    """By the project's own rule. Raises OwnPartError for fields that are no path from start to target."""
+    weights, cells = plain(problem.weights), path.cell_array
+    number, index = first_fault(weights, cells, problem.corner_cutting)
+    fault = f"{FAULTS[number]}, at its field {index}" if FAULTS[number] is not PathFault.NONE else ""
+    if len(cells) == 0 or tuple(cells[0]) != problem.start or tuple(cells[-1]) != problem.target:
+        fault = PathFault.WRONG_ENDS
+    if fault:
+        more = f"rover-companion check-planner {name} tells more"
+        raise OwnPartError(f"planner {name!r:.80}: its path is none: {fault}; {more}")
+    return float(cells_cost(weights, cells))
 
 
 def wanted_kinematics(
@@ -270,6 +303,22 @@ def wanted_kinematics(
         raise TurningError(f"--turning-radius-m: {name} does not heed it; {' and '.join(able)} do")
     heading_rad = None if heading_deg is None else math.remainder(math.radians(90.0 - heading_deg), 2.0 * math.pi)
     return KinematicConstraints(heading_rad, grid.fields(radius_m))
+
+
+def plan_command(problem: PlanningProblem, resolution_m: float, settings: Settings, stem: Path) -> str:
+    """What plans this problem; its map is ``stem``.yaml. Obstacles that move are left out.
+
+    Raises UnknownPlannerError.
+    """
+    planner = settings.navigator.planner
+    (x, y), (to_x, to_y), how = problem.start, problem.target, problem.kinematics
+    turning = ""
+    if how.turning_radius_fields > 0.0 and make_planner(planner, settings.planner).capabilities.turning_radius:
+        turning = f" --turning-radius-m {how.turning_radius_fields * resolution_m:g}"
+        heading_rad = how.heading_rad
+        turning += "" if heading_rad is None else f" --heading-deg {90.0 - math.degrees(heading_rad):g}"
+    ends = f"--start {x},{y} --target {to_x},{to_y}"
+    return f"rover-companion plan {shlex.quote(f'{stem}.yaml')} {ends} --planner {shlex.quote(planner)}{turning}"
 
 
 def place_of(option: str, text: str, grid: Grid, top_left: bool) -> Cell:

@@ -10,8 +10,10 @@ import typer
 
 from companion.cli.images import save_decision, save_motions
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture
+from companion.cli.plan import plan_command
 from companion.cli.replay_progress import watched_replay
-from companion.mapping.map_files import MapError
+from companion.core.grid import BASE_WEIGHT
+from companion.mapping.map_files import MapError, save_weighed_map
 from companion.recording.contacts import COLLISIONS, contacts_of
 from companion.recording.reader import Record, load_record
 from companion.recording.record_clock import record_clock
@@ -88,6 +90,7 @@ def _explained(record: Record, why: str, image: Path | None) -> ReplayResult:
     if explainer.explanation is None:
         raise RecordError(f"{record.directory}: what is left of it ends before decision {number}")
     _explain(explainer.explanation, image)
+    _tell_how_to_plan(record, explainer.explanation, image)
     return result
 
 
@@ -100,6 +103,18 @@ def _explain(explanation: Explanation, image: Path) -> None:
         beside = image.with_name(f"{image.stem}-motions{image.suffix}")
         save_motions(beside, choice, f"after decision {explanation.number}")
         typer.echo(f"picture of the motions: {beside}")
+
+
+def _tell_how_to_plan(record: Record, explanation: Explanation, image: Path) -> None:
+    """A command that plans on the weights that the last search of the decision was given."""
+    if explanation.problem is None:
+        return
+    stem = image.with_name(f"{image.stem}-map")
+    save_weighed_map(explanation.weighed.with_weights(explanation.problem.weights), stem)
+    command = plan_command(explanation.problem, explanation.weighed.resolution_m, record.settings, stem)
+    typer.echo(f"to plan it again: {command}")
+    if float(explanation.problem.weights.min()) < BASE_WEIGHT:
+        typer.echo(f"  (ground that the mission prefers has the usual weight, {BASE_WEIGHT:g}, in this map)")
 
 
 def _collisions(directory: Path) -> list[str]:

@@ -53,6 +53,12 @@ class Shades:
     mode: Literal["trinary", "scale", "raw"] = "trinary"
 
 
+WEIGHED = Shades(occupied_thresh=0.99, free_thresh=0.0, mode="scale")
+"""Of maps whose greys are weights."""
+MOST_SHARE = 0.99
+"""Of the way from free ground to an obstacle: what is more is an obstacle."""
+
+
 def load_map(path: Path, resolution_m: float | None = None) -> Grid:
     """Read a map; the suffix tells the format.
 
@@ -84,22 +90,39 @@ def save_ros_map(grid: Grid, path_without_suffix: Path, known: NDArray[np.bool_]
     if known is not None:
         grey[~known] = UNKNOWN_GREY
     grey[grid.weights >= OBSTACLE] = OBSTACLE_GREY
+    _save_ros(grid, path_without_suffix, grey, Shades())
+
+
+def save_weighed_map(grid: Grid, path_without_suffix: Path) -> None:
+    """Like ``save_ros_map``, with the weights as well, in 65536 shades; no weight is less than the base weight.
+
+    Raises MapError when the files cannot be written.
+    """
+    share = np.clip((grid.weights - BASE_WEIGHT) / (OBSTACLE - BASE_WEIGHT), 0.0, MOST_SHARE)
+    occupancy = np.where(grid.weights >= OBSTACLE, 1.0, WEIGHED.occupied_thresh * share)
+    _save_ros(grid, path_without_suffix, np.rint(65535.0 * (1.0 - occupancy)).astype(">u2"), WEIGHED)
+
+
+def _save_ros(grid: Grid, path_without_suffix: Path, grey: NDArray[np.unsignedinteger], shades: Shades) -> None:
+    """``grey``: south row first. Raises MapError."""
     image = path_without_suffix.with_name(path_without_suffix.name + ".pgm")
     text = yaml.safe_dump(
         {
             "image": image.name,
-            "mode": "trinary",
+            "mode": shades.mode,
             "resolution": float(grid.resolution_m),
             "origin": [float(grid.south_west.east_m), float(grid.south_west.north_m), 0.0],
             "negate": 0,
-            "occupied_thresh": 0.65,
-            "free_thresh": 0.196,
+            "occupied_thresh": shades.occupied_thresh,
+            "free_thresh": shades.free_thresh,
         },
         sort_keys=False,
         allow_unicode=True,
     )
     try:
-        write_whole(image, f"P5\n{grid.width} {grid.height}\n255\n".encode() + grey[::-1].tobytes())
+        write_whole(
+            image, f"P5\n{grid.width} {grid.height}\n{np.iinfo(grey.dtype).max}\n".encode() + grey[::-1].tobytes()
+        )
         write_whole(image.with_suffix(".yaml"), text.encode())
     except OSError as error:
         raise MapError(f"{image}: cannot be written: {error.strerror}; choose another place") from error
@@ -155,10 +178,10 @@ def _weights_of(shade: NDArray[np.float32], transparent: NDArray[np.bool_] | Non
         occupancy = shade if shades.negate else 1.0 - shade
         occupied = occupancy > shades.occupied_thresh
         span = max(shades.occupied_thresh - shades.free_thresh, 1e-9)
-        between = np.clip((occupancy - shades.free_thresh) / span, 0.0, 0.99)
+        between = np.clip((occupancy - shades.free_thresh) / span, 0.0, MOST_SHARE)
     weights = np.full(shade.shape, BASE_WEIGHT)
     if shades.mode != "trinary":
-        weights += (OBSTACLE - BASE_WEIGHT) * np.minimum(between, 0.99)
+        weights += (OBSTACLE - BASE_WEIGHT) * np.minimum(between, MOST_SHARE)
     weights[occupied] = OBSTACLE
     if transparent is not None:
         weights[transparent] = BASE_WEIGHT

@@ -122,7 +122,7 @@ def initial_state(start: Cell, target: Cell, seed: int = 0, better_every: int = 
 def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavState, Decision]:
     """The step function (figure 11). Call it when a field is entered and when the path ahead gets blocked."""
     entered = cell != state.past[-1]
-    state = _arrive(state, cell)
+    state = arrived(state, cell)
     if cell == state.target:
         return state, Decision(Action.REACHED, Part.EXPLORE, (), None, DecisionReason.REACHED)
     if state.returning:
@@ -278,8 +278,11 @@ def _follow(state: NavState, reason: DecisionReason, searches: tuple[SearchKind,
     return Decision(Action.FOLLOW, Part.EXPLORE, state.current.cells[state.index :], None, reason, searches)
 
 
-def _arrive(state: NavState, cell: Cell) -> NavState:
-    """Record the field entered on the past path (its retraced end is dropped in return mode) and the current path."""
+def arrived(state: NavState, cell: Cell) -> NavState:
+    """Record the field entered on the past path (its retraced end is dropped in return mode) and the current path.
+
+    A path that the rover is not beside any more is dropped.
+    """
     if cell == state.past[-1]:
         return state
     if state.returning:

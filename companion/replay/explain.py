@@ -19,7 +19,7 @@ from companion.control.motion_kernels import BLOCKED_S, way_of
 from companion.core.frames import Pose
 from companion.core.grid import OBSTACLE, Grid
 from companion.mapping.evidence_map import known_fields
-from companion.navigation.field_step import Decision, NavState, follows_clear_path
+from companion.navigation.field_step import Decision, NavState, arrived, follows_clear_path
 from companion.navigation.turning_cost import with_turning_cost
 from companion.planning.hybrid import Hybrid
 from companion.planning.planner import Capabilities, Planner
@@ -34,7 +34,7 @@ from companion.settings import Settings
 class Candidate:
     """A path that was considered. ``cost``: of its fields, inf without a path; ``curve_cost``: along its curve, if any.
 
-    ``part_of``: the proposal of one planner within a search.
+    ``part_of``: the proposal of one planner within a search. ``problem``: what was asked, None where nothing was.
     """
 
     name: str
@@ -43,6 +43,7 @@ class Candidate:
     cost: float
     curve_cost: float | None = None
     part_of: bool = False
+    problem: PlanningProblem | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -67,6 +68,11 @@ class Explanation:
     candidates: tuple[Candidate, ...]
     motions: MotionChoice | None = None
     """None where no motions are planned, or none were before the next decision."""
+
+    @property
+    def problem(self) -> PlanningProblem | None:
+        """What the last search was asked; None if nothing was searched."""
+        return next((one.problem for one in reversed(self.candidates) if one.problem and not one.part_of), None)
 
 
 @dataclass
@@ -164,9 +170,13 @@ def _choice(companion: Companion) -> MotionChoice | None:
 def _rest_of_path(scene: _Scene) -> Candidate:
     """The path that was being followed, from the present field on."""
     assert scene.state.current is not None
-    current = scene.state.current
-    ahead = current.cell_array[scene.state.index :]
-    note = "clear" if follows_clear_path(scene.state, scene.grid) else "blocked"
+    here = arrived(scene.state, scene.grid.cell_at(scene.pose.point))
+    beside = here.current is not None
+    state = here if beside else scene.state
+    assert state.current is not None
+    ahead = state.current.cell_array[state.index :]
+    note = "clear" if follows_clear_path(state, scene.grid) else "blocked"
+    note = note if beside else f"{note}; the rover has left it"
     cost = cost_of(scene.weighed, ahead)
     return Candidate("what is left of the current path", note, Path(ahead, cost), cost)
 
@@ -218,7 +228,7 @@ def _candidate(problem: PlanningProblem, result: PlanResult, *, part_of: bool) -
     name = f"proposed by {result.planner}" if part_of else f"search by {result.planner}, {ends}"
     along = None if path is None or path.curve is None else float(curve_cost(plain(problem.weights), path.curve))
     note = ", ".join(part for part in (result.status.value, work) if part)
-    return Candidate(name, note, path, math.inf if path is None else path.cost, along, part_of)
+    return Candidate(name, note, path, math.inf if path is None else path.cost, along, part_of, problem)
 
 
 def explanation_lines(why: Explanation) -> list[str]:
@@ -243,6 +253,8 @@ def explanation_lines(why: Explanation) -> list[str]:
         )
     if not why.candidates:
         lines.append("  nothing was searched, and there was no path to follow")
+    if any(candidate.curve_cost is not None for candidate in why.candidates):
+        lines.append(TWO_COSTS)
     if decision.path:
         lines.append(_shares(why, np.asarray(decision.path)))
     return lines if why.motions is None else [*lines, *motion_lines(why.motions)]
@@ -250,6 +262,11 @@ def explanation_lines(why: Explanation) -> list[str]:
 
 RANKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Shares of the motions, by cost, of which the last is shown."""
+
+
+TWO_COSTS = (
+    "  the cost from field to field decides between paths; that along the curve only between the two planners of hybrid"
+)
 
 
 def motion_lines(choice: MotionChoice) -> list[str]:
@@ -289,13 +306,13 @@ def cost_text(candidate: Candidate) -> str:
     if candidate.path is None:
         return "no path"
     along = "" if candidate.curve_cost is None else f" ({candidate.curve_cost:.2f} along its curve)"
-    return f"cost {candidate.cost:.2f}{along}, {candidate.path.length_fields:.1f} fields long"
+    return f"cost {candidate.cost:.2f} from field to field{along}, {candidate.path.length_fields:.1f} fields long"
 
 
 def _shares(why: Explanation, cells: CellArray) -> str:
     """The parts of the cost of the path that was chosen."""
     ground, seen, whole = (cost_of(grid, cells) for grid in (why.ground, why.grid, why.weighed))
     return (
-        f"taken: {len(cells)} fields, cost {whole:.2f} = {ground:.2f} ground + {seen - ground:.2f} beside obstacles or "
-        f"remembered as costly + {whole - seen:.2f} for turning"
+        f"taken: {len(cells)} fields, cost {whole:.2f} from field to field = {ground:.2f} ground + {seen - ground:.2f} "
+        f"beside obstacles or remembered as costly + {whole - seen:.2f} for turning"
     )

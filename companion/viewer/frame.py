@@ -120,7 +120,7 @@ def frame_of(companion: Companion, status: Status) -> Json:
         "kind": "frame",
         "t": round(now_s, 2),
         "pose": None if pose is None else [*_place(pose.point), round(pose.heading_rad, 4)],
-        "speed": round(vehicle.forward_m_s, 3),
+        "speed": None if vehicle.position is None else round(vehicle.forward_m_s, 3),
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
         **mode_of(vehicle, run),
         **doing_of(companion, status),

@@ -6,6 +6,7 @@ Nouns: heat map.
 from __future__ import annotations
 
 import math
+import textwrap
 from pathlib import Path
 from typing import Literal
 
@@ -28,6 +29,10 @@ COLOURS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.RED, drawing.GRE
 STROKES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
 MOST_PANELS = 9
 """Of a heat map: more combinations are not drawn."""
+PANEL_IN, LETTER_IN, TITLE_LETTER_IN = 4.2, 0.064, 0.098
+"""The width of a panel, and about that of a letter of the legend and of a title."""
+HANDLE_IN, LINE_IN = 0.55, 0.18
+"""Of the legend: a handle with room, and the height of a line."""
 
 
 def times(campaign: CampaignTable, runs: Runs) -> Figure:
@@ -35,7 +40,7 @@ def times(campaign: CampaignTable, runs: Runs) -> Figure:
     worlds = [world for world in campaign.worlds if any(spec.world == world and one.complete for spec, one in runs)]
     columns = min(3, len(worlds))
     lines = -(-len(worlds) // columns)
-    figure = Figure(figsize=(4.2 * columns + 0.6, 3.0 * lines + 0.6), layout="constrained")
+    figure = Figure(figsize=(PANEL_IN * columns + 0.6, 3.0 * lines + 0.6), layout="constrained")
     panels = figure.subplots(lines, columns, squeeze=False).ravel()
     names = _combinations(campaign, runs)
     looks = {key: (COLOURS[n % len(COLOURS)], STROKES[n // len(COLOURS) % len(STROKES)]) for n, key in enumerate(names)}
@@ -47,7 +52,7 @@ def times(campaign: CampaignTable, runs: Runs) -> Figure:
                 shares = np.arange(len(at_s) + 1) / len(own)
                 colour, stroke = looks[key]
                 panel.step([at_s[0], *at_s], shares, where="post", color=colour, linestyle=stroke)
-        drawing.title(panel, labels(campaign, "world")[world])
+        drawing.title(panel, _wrapped(labels(campaign, "world")[world], PANEL_IN, TITLE_LETTER_IN))
         panel.set_ylim(0.0, 1.02)
         panel.spines[["top", "right"]].set_visible(False)
         panel.set_xlabel("driving time, s", fontsize=8)
@@ -56,11 +61,21 @@ def times(campaign: CampaignTable, runs: Runs) -> Figure:
         panel.set_visible(False)
     panels[0].set_ylabel("share of all runs", fontsize=8)
     if len(names) > 1:
+        wide_in = figure.get_figwidth()
+        texts = [_wrapped(name, wide_in - 2.0 * HANDLE_IN, LETTER_IN) for name in names.values()]
+        longest = max(len(line) for text in texts for line in text.split("\n"))
+        fitting = max(1, int(wide_in / (LETTER_IN * longest + HANDLE_IN)))
+        columns = min(3, len(names), fitting)
+        tall = -(-sum(text.count("\n") + 1 for text in texts) // columns)
+        figure.set_figheight(figure.get_figheight() + LINE_IN * max(0, tall - 2))
         handles = [Line2D([], [], color=colour, linestyle=stroke) for colour, stroke in looks.values()]
-        figure.legend(
-            handles, names.values(), loc="outside lower center", ncols=min(3, len(names)), frameon=False, fontsize=8
-        )
+        figure.legend(handles, texts, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
     return figure
+
+
+def _wrapped(text: str, width_in: float, letter_in: float) -> str:
+    """The text in lines of this width: faults in words are long."""
+    return textwrap.fill(text, max(10, int(width_in / letter_in)), break_on_hyphens=False)
 
 
 def _key(campaign: CampaignTable, spec: RunSpec) -> tuple[object, ...]:
@@ -102,7 +117,7 @@ def _heat_map(mission_file: Path, results: dict[str, list[RunResult]]) -> Figure
     north_m, east_m = _extent(places, scenario.start.north_m, scenario.start.east_m)
     longest_s = max((seconds for one in spent.values() for seconds in one.values()), default=1.0)
     columns = math.ceil(math.sqrt(len(spent)))
-    lines, width = -(-len(spent) // columns), 8.0 if len(spent) == 1 else 4.2
+    lines, width = -(-len(spent) // columns), 8.0 if len(spent) == 1 else PANEL_IN
     tall = width * 0.9 * min(1.2, (north_m[1] - north_m[0]) / (east_m[1] - east_m[0])) + 0.9
     figure = Figure(figsize=(width * columns + 0.8, tall * lines + 0.3), layout="constrained")
     panels = figure.subplots(lines, columns, squeeze=False).ravel()
@@ -115,16 +130,19 @@ def _heat_map(mission_file: Path, results: dict[str, list[RunResult]]) -> Figure
         image = panel.imshow(
             shares, origin="lower", extent=shown_at, cmap="YlOrRd", vmin=0.0, vmax=longest_s, interpolation="nearest"
         )
+        panel.set_anchor("W")  # its title has the room to the right of it
         panel.set_xlim(east_m[0], east_m[1])
         panel.set_ylim(north_m[0], north_m[1])
         panel.plot(scenario.start.east_m, scenario.start.north_m, "^", color=drawing.BLUE, markersize=8)
         panel.set_xlabel("metres east", fontsize=8)
         panel.set_ylabel("metres north", fontsize=8)
         panel.tick_params(labelsize=8)
-        drawing.title(panel, f"{mission_file.stem}, {name}: {len(results[name])} runs")
+        drawing.title(
+            panel, _wrapped(f"{mission_file.stem}, {name}: {len(results[name])} runs", width, TITLE_LETTER_IN)
+        )
     for panel in panels[len(spent) :]:
         panel.set_visible(False)
-    figure.colorbar(image, ax=panels.tolist(), label="seconds in a square metre", shrink=0.8)
+    figure.colorbar(image, ax=panels.tolist(), label="seconds in a square metre", shrink=0.8, panchor=False)
     return figure
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from companion.storage.files import write_whole
+from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignTable, run_count
 from sitl.campaign.pictures import MOST_PANELS, heat_maps, times
 from sitl.campaign.policies import Policy, broken
@@ -37,7 +37,8 @@ code { font-size: .85em; background: var(--soft); padding: .1rem .3rem; user-sel
 
 def write_report(file: Path, campaign: CampaignTable, runs: Runs, source: Path) -> None:
     """Write it. ``source``: the campaign's file, for the commands that drive a run again. Raises OSError."""
-    write_whole(file, page(campaign, runs, source).encode())
+    with whole_file(file) as new:
+        new.write_text(page(campaign, runs, source), encoding="utf-8")
 
 
 def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:

@@ -6,6 +6,7 @@ import csv
 from dataclasses import asdict
 from pathlib import Path
 
+from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.policies import broken
 from sitl.campaign.summary import Runs
@@ -16,7 +17,7 @@ LEFT_OUT = ("dwelt",)
 def write_csv(file: Path, runs: Runs) -> None:
     """A line a run. Raises OSError."""
     records = records_of(runs)
-    with file.open("w", encoding="utf-8", newline="") as out:
+    with whole_file(file) as new, new.open("w", encoding="utf-8", newline="") as out:
         writer = csv.DictWriter(out, records[0].keys() if records else ["id"])
         writer.writeheader()
         writer.writerows(records)
@@ -31,7 +32,8 @@ def write_parquet(file: Path, runs: Runs) -> None:
         raise CampaignError(
             "--parquet: pyarrow is not installed; install rover-companion[parquet], or leave the option out"
         ) from error
-    parquet.write_table(pyarrow.Table.from_pylist(records_of(runs)), file)
+    with whole_file(file) as new:
+        parquet.write_table(pyarrow.Table.from_pylist(records_of(runs)), new)
 
 
 def records_of(runs: Runs) -> list[dict[str, object]]:

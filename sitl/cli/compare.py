@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from companion.cli.inputs import EXIT_BAD_INPUT, writable, written
-from companion.storage.files import write_whole
+from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.pictures import times
 from sitl.cli.campaign import BAD_INPUT, drive_campaign
@@ -45,7 +45,8 @@ def compare(
             tried = Path(folder) / FILE
             tried.write_text(_campaign(missions, tried.parent, planners, controllers, seeds), encoding="utf-8")
             _load(tried)
-            write_whole(file, _campaign(missions, out, planners, controllers, seeds).encode())
+            with whole_file(file) as new:
+                new.write_text(_campaign(missions, out, planners, controllers, seeds), encoding="utf-8")
         runs = drive_campaign(file, out, jobs)
         if any(result.complete for _, result in runs):
             with written(out / PLOT):

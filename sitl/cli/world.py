@@ -11,8 +11,9 @@ import typer
 from PIL import Image
 from pydantic import ValidationError
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture, replaced, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture, writable, written
 from companion.core.own_parts import OwnPartError
+from companion.storage.files import whole_file
 from companion.storage.validation import alike, describe_first
 from sitl.generators.canvas import FINE_M
 from sitl.generators.kinds import GroundKind, Parameters, is_kind, parameters_of
@@ -62,8 +63,8 @@ def make(
         with written(mission):
             _write(ground, seed, given, measures, mission)
         if image is not None:
-            with replaced(image) as new:
-                _draw(ground, seed, new)
+            with written(image):
+                _draw(ground, seed, image)
     except (WorldError, NoWayError, OwnPartError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -112,7 +113,8 @@ def _lines(measures: Difficulty) -> list[str]:
 def _write(ground: MadeGround, seed: int, given: Parameters, measures: Difficulty, file: Path) -> None:
     """The mission, and beside it the world as an image."""
     world = file.with_suffix(".png")
-    Image.fromarray(np.where(ground.world.obstacles[::-1], 0, 255).astype(np.uint8)).save(world)
+    with whole_file(world) as new:
+        Image.fromarray(np.where(ground.world.obstacles[::-1], 0, 255).astype(np.uint8)).save(new)
     start, goal = ground.start_m, ground.goal_m
     told = ", ".join(f"{name} {value:g}" for name, value in given.model_dump().items())
     measured = ", ".join(f"{name} {value:.3g}" for name, value in asdict(measures).items())
@@ -144,7 +146,8 @@ def _write(ground: MadeGround, seed: int, given: Parameters, measures: Difficult
             f"route_m = [{route}]",
             "repeat = true",
         ]
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with whole_file(file) as new:
+        new.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _draw(ground: MadeGround, seed: int, file: Path) -> None:

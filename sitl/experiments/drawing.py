@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Cell, Grid
-from companion.storage.files import refuse_pipe
+from companion.storage.files import refuse_pipe, whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +35,8 @@ def save(figure: Figure, file: Path) -> Path:
     """Write the picture (the format follows from the suffix), without the date and version that would change it."""
     file.parent.mkdir(parents=True, exist_ok=True)
     refuse_pipe(file)
-    figure.savefig(file, metadata={"Software": None} if file.suffix == ".png" else None)
+    with whole_file(file) as new:
+        figure.savefig(new, metadata={"Software": None} if file.suffix == ".png" else None)
     return file
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich import box
 from rich.table import Table
 
-from companion.storage.files import read_at_most
+from companion.storage.files import read_at_most, whole_file
 
 MOST_BYTES = 10_000_000
 
@@ -32,7 +32,8 @@ def write_section(folder: Path, name: str, text: str, file: str) -> Path:
         after = head + section + (f"\n{tail}" if tail else "")
     else:
         after = f"{before.rstrip()}\n\n{section}"
-    page.write_text(after, encoding="utf-8")
+    with whole_file(page) as new:
+        new.write_text(after, encoding="utf-8")
     return page
 
 

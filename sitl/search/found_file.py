@@ -7,6 +7,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+from companion.storage.files import whole_file
 from sitl.campaign.run_spec import RunSpec
 from sitl.campaign.worded import GroundSpec, Worded
 from sitl.search.search import Find
@@ -48,7 +49,8 @@ def write_find(find: Find, spec: RunSpec, file: Path, command: str) -> None:
         *_settings(spec),
     ]
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text("\n".join([*lines, ""]), encoding="utf-8")
+    with whole_file(file) as new:
+        new.write_text("\n".join([*lines, ""]), encoding="utf-8")
 
 
 def differences(find: Find) -> str:

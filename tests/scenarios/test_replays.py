@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 from pathlib import Path
 
@@ -261,6 +262,11 @@ def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
         assert image.width >= 900
         colours = {colour for _, colour in image.convert("RGB").getcolors(1 << 20) or []}
     assert {(214, 60, 50), (40, 110, 200), (150, 120, 90), FREE_COLOUR} <= colours
+    (command,) = (line for line in result.output.splitlines() if line.startswith("to plan it again: "))
+    name, *words = shlex.split(command.removeprefix("to plan it again: "))
+    again = CliRunner().invoke(app, [*words, "--json"])
+    assert name == "rover-companion" and again.exit_code == 0, again.output
+    assert json.loads(again.stdout)["path"][-1] == [int(word) for word in words[words.index("--target") + 1].split(",")]
     late = CliRunner().invoke(app, ["replay", str(record), "--why", "100000"])
     assert late.exit_code == 2 and "the last one is" in late.output
 

@@ -9,7 +9,7 @@ const ROWS = 120;
 
 export class Decisions {
   constructor(record, jump) {
-    Object.assign(this, { record, jump, current: -1, hovered: null, from: -1 });
+    Object.assign(this, { record, jump, current: -1, hovered: null, from: -1, rows: [] });
     this.changed = () => {};
     this.head = make("h2");
     this.why = make("div", { class: "why-decision" });
@@ -87,15 +87,27 @@ export class Decisions {
     const from = Math.max(0, Math.min(this.current - ROWS / 2, this.record.decisions.length - ROWS));
     if (from !== this.from) {
       this.from = from;
+      const { decisions } = this.record;
+      this.rows = decisions.slice(from, from + ROWS).map((decision) => this.row(decision));
       this.list.replaceChildren(
-        ...this.record.decisions.slice(from, from + ROWS).map((decision) => this.row(decision)),
+        ...this.more(from, "earlier", from - 1),
+        ...this.rows,
+        ...this.more(decisions.length - from - this.rows.length, "later", from + this.rows.length),
       );
     }
-    [...this.list.children].forEach((row, i) =>
+    this.rows.forEach((row, i) =>
       setAttribute(row, "aria-current", from + i === this.current ? "true" : null),
     );
-    const row = this.list.children[this.current - from];
+    const row = this.rows[this.current - from];
     if (row) this.list.scrollTop = row.offsetTop - this.list.offsetTop - this.list.clientHeight / 2;
+  }
+
+  /** What is not in the list, as a button that goes there. */
+  more(count, when, next) {
+    if (count <= 0) return [];
+    const go = () => this.jump(this.record.decisionTimes[next]);
+    const text = `${count} ${when} ${count === 1 ? "decision" : "decisions"}`;
+    return [make("li", {}, make("button", { type: "button", class: "more", onclick: go }, text))];
   }
 
   row(decision) {
@@ -112,12 +124,19 @@ export class Decisions {
     );
   }
 
-  /** Draws the candidates; the one taken is strong, the one under the mouse, too. */
-  draw(pen) {
+  /** The candidates on the map; the one taken is strong, the one under the mouse, too. */
+  drawLines(pen) {
+    for (const i of this.order()) this.drawLine(pen, this.shown.candidates[i], i);
+  }
+
+  drawCosts(pen) {
+    // The one taken has the first choice.
+    for (const i of this.order().reverse()) this.drawCost(pen, this.shown.candidates[i], i);
+  }
+
+  order() {
     const candidates = this.shown?.candidates ?? [];
-    const order = candidates.map((_, i) => i).sort((a, b) => candidates[a].taken - candidates[b].taken);
-    for (const i of order) this.drawLine(pen, candidates[i], i);
-    for (const i of order.reverse()) this.drawCost(pen, candidates[i], i); // the one taken has the first choice
+    return candidates.map((_, i) => i).sort((a, b) => candidates[a].taken - candidates[b].taken);
   }
 
   drawLine(pen, { cells, curve, taken }, i) {

@@ -12,6 +12,22 @@ export function length(line) {
   return sum;
 }
 
+/** Places that take the same room as all of these: the four corners round them where they are many. */
+export function outermost(places, most = 400) {
+  if (places.length <= most) return places;
+  let [south, north, west, east] = [Infinity, -Infinity, Infinity, -Infinity];
+  for (const [n, e] of places) {
+    [south, north] = [Math.min(south, n), Math.max(north, n)];
+    [west, east] = [Math.min(west, e), Math.max(east, e)];
+  }
+  return [
+    [south, west],
+    [south, east],
+    [north, west],
+    [north, east],
+  ];
+}
+
 /** A point of a rover's outline [forward, right] at a pose [north, east, heading]. */
 export function placed([forward, right], [north, east, heading]) {
   const cos = Math.cos(heading);

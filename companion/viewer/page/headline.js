@@ -30,12 +30,12 @@ export class Headline {
     this.show(null, null);
   }
 
-  /** Shows scene and frame. `trouble`, a text, stands instead of the rover's own line when data is not fresh. */
-  show(scene, frame, trouble = "") {
+  /** Shows scene and frame. `trouble`, a text, stands instead of the rover's own line when data is not fresh; `open`: the page is connected. */
+  show(scene, frame, trouble = "", open = false) {
     const state = trouble ? "offline" : SIGNS.has(frame?.state) ? frame.state : "connecting";
     setAttribute(this.node, "data-state", state);
     setIcon(this.sign, state === "ended" && reached(frame) < frame.statuses?.length ? "error" : state);
-    const line = trouble || sentence(frame?.line) || "Connecting";
+    const line = trouble || sentence(frame?.line) || (open ? "Waiting for the run to begin" : "Connecting");
     setText(this.line, line);
     setAttribute(this.line, "data-long", line.length > LONG ? "" : null);
     setText(this.spoken, trouble ? trouble.replace(/ since.*/, "") : (frame?.line ?? ""));

@@ -21,6 +21,22 @@ export function drawFrame(pen, model) {
   if (model.track.points.length > 1) drawSpeeds(pen, model.track.topSpeed, right + 16, bottom - 7);
 }
 
+/** Before the rover's first position there is nothing to draw: the map says so, and what is waited for. */
+export function drawNothingYet(pen, { frame, map, scene }) {
+  if (frame?.pose || map.shape || scene?.home) return;
+  const { camera, colours } = pen;
+  const [x, y] = [(camera.width - camera.coveredRight) / 2, (camera.height - camera.covered) / 2];
+  const head = { size: 17, weight: 750 };
+  const lines = ["No position of the rover yet"];
+  if (frame?.state !== "ended") lines.push("The map begins with it");
+  const width = Math.max(...lines.map((line) => pen.widthOf(line, head))) + 32;
+  plate(pen, x - width / 2, y - 28, width, 28 * lines.length + 6);
+  lines.forEach((line, i) => {
+    const look = i ? { colour: colours.soft } : head;
+    pen.text(line, x, y - 10 + 26 * i, { ...look, align: "center", halo: false });
+  });
+}
+
 function plate(pen, left, top, width, height) {
   const { context, colours } = pen;
   context.globalAlpha = 0.85;

@@ -4,6 +4,8 @@ import { distance } from "viewer/geometry.js";
 import { metres, short } from "viewer/words.js";
 
 const RADIUS = 12;
+/** Marks that would cover each other are smaller, down to this. */
+const SMALLEST = 6;
 const FAILED = new Set(["unreachable", "timed out", "failed", "given up"]);
 const EDGE_PX = 34;
 
@@ -14,37 +16,63 @@ export function kindOf(status) {
   return status === "skipped" ? "skipped" : "pending";
 }
 
-/** Home and all targets. The goal comes first, so its name has room. */
+/** The radius of the mark at each place of the screen: half the way to the nearest other one, within bounds. */
+export function radii(spots) {
+  const order = spots.map((_, i) => i).sort((a, b) => spots[a][0] - spots[b][0]);
+  const found = spots.map(() => RADIUS);
+  order.forEach((a, at) => {
+    for (let next = at + 1; next < order.length; next += 1) {
+      const b = order[next];
+      if (spots[b][0] - spots[a][0] >= 2 * RADIUS) break;
+      const half = Math.max(SMALLEST, Math.hypot(spots[b][0] - spots[a][0], spots[b][1] - spots[a][1]) / 2 - 1);
+      found[a] = Math.min(found[a], half);
+      found[b] = Math.min(found[b], half);
+    }
+  });
+  return found;
+}
+
+/** Home and all targets. The goal's name comes first, so it has room, and its mark last, so nothing covers it. */
 export function drawMarks(pen, scene, frame) {
   const goal = frame?.goal;
   const targets = scene.targets ?? [];
   const current = goal
     ? targets.findIndex((target) => target.name === goal.name && distance(target.place, goal.place) < 0.5)
     : -1;
-  targets.forEach((target) => takeRoom(pen, target));
-  if (goal) drawGoal(pen, goal, current >= 0 ? String(current + 1) : "");
+  const radius = radii(targets.map((target) => pen.camera.toScreen(...target.place)));
+  targets.forEach((target, i) => takeRoom(pen, target, radius[i]));
+  const goalRadius = radius[current] ?? RADIUS;
+  if (goal) nameGoal(pen, goal, goalRadius);
   if (scene.home) drawHome(pen, scene.home);
   targets.forEach((target, i) => {
-    if (i !== current) drawTarget(pen, target, i, frame?.statuses?.[i] ?? "pending");
+    if (i !== current) drawTarget(pen, target, i, frame?.statuses?.[i] ?? "pending", radius[i]);
   });
+  if (goal) drawGoal(pen, goal, current >= 0 ? String(current + 1) : "", goalRadius);
 }
 
 // No name lies over a target's mark.
-function takeRoom(pen, target) {
+function takeRoom(pen, target, radius) {
   const [x, y] = pen.camera.toScreen(...target.place);
-  const half = RADIUS + 2;
+  const half = radius + 2;
   pen.taken.push([x - half, y - half, 2 * half, 2 * half]);
 }
 
-function drawGoal(pen, goal, sign) {
+function nameGoal(pen, goal, radius) {
+  const [x, y] = pen.camera.toScreen(...goal.place);
+  const half = radius + 8;
+  pen.taken.push([x - half, y - half, 2 * half, 2 * half]);
+  pen.label(short(goal.name), x, y, radius + 14, { size: 16, weight: 750 });
+}
+
+function drawGoal(pen, goal, sign, radius) {
   const { camera, colours } = pen;
   const [x, y] = camera.toScreen(...goal.place);
-  pen.disc(x, y, RADIUS + 8, null, colours.halo, 7);
-  pen.disc(x, y, RADIUS + 8, null, colours.goal, 3.5);
-  pen.disc(x, y, RADIUS + 1, colours.goal, colours.halo, 2);
-  pen.text(sign, x, y + 1, { size: 14, weight: 800, colour: colours.goalText, align: "center", halo: false });
-  pen.taken.push([x - 20, y - 20, 40, 40]);
-  pen.label(short(goal.name), x, y, RADIUS + 14, { size: 16, weight: 750 });
+  const share = radius / RADIUS;
+  pen.disc(x, y, radius + 8 * share, null, colours.halo, 7 * share);
+  pen.disc(x, y, radius + 8 * share, null, colours.goal, 3.5 * share);
+  pen.disc(x, y, radius + 1, colours.goal, colours.halo, 2);
+  const size = radius + 2;
+  pen.text(sign, x, y + 1, { size, weight: 800, colour: colours.goalText, align: "center", halo: false });
 }
 
 function drawHome(pen, home) {
@@ -69,24 +97,24 @@ function drawHome(pen, home) {
   pen.label("home", x, y, 15, { size: 12 });
 }
 
-function drawTarget(pen, target, index, status) {
+function drawTarget(pen, target, index, status, radius) {
   const { camera, colours } = pen;
   const [x, y] = camera.toScreen(...target.place);
   if (x < -40 || y < -40 || x > camera.width + 40 || y > camera.height + 40) return;
   const kind = kindOf(status);
   const fill = { good: colours.done, error: colours.failed }[kind] ?? colours.pending;
   const edge = kind === "skipped" ? colours.soft : fill === colours.pending ? colours.ink : fill;
-  pen.disc(x, y, RADIUS + 2, colours.halo);
-  pen.disc(x, y, RADIUS, fill, edge, 2);
-  drawSign(pen, kind, index, x, y);
+  pen.disc(x, y, radius + 2, colours.halo);
+  pen.disc(x, y, radius, fill, edge, 2);
+  drawSign(pen, kind, index, x, y, radius / RADIUS);
   const name = kind === "pending" ? short(target.name) : `${short(target.name)} · ${status}`;
-  pen.label(name, x, y, RADIUS + 5);
+  pen.label(name, x, y, radius + 5);
 }
 
-function drawSign(pen, kind, index, x, y) {
+function drawSign(pen, kind, index, x, y, share) {
   const { context, colours } = pen;
   if (kind === "pending") {
-    pen.text(String(index + 1), x, y + 1, { size: 13, weight: 750, align: "center", halo: false });
+    pen.text(String(index + 1), x, y + 1, { size: 13 * share, weight: 750, align: "center", halo: false });
     return;
   }
   const strokes = {
@@ -116,9 +144,11 @@ function drawSign(pen, kind, index, x, y) {
   }[kind];
   context.beginPath();
   for (const stroke of strokes)
-    stroke.forEach(([dx, dy], i) => (i ? context.lineTo(x + dx, y + dy) : context.moveTo(x + dx, y + dy)));
+    stroke.forEach(([dx, dy], i) =>
+      (i ? context.lineTo(x + share * dx, y + share * dy) : context.moveTo(x + share * dx, y + share * dy)),
+    );
   context.lineCap = "round";
-  pen.stroke(kind === "skipped" ? colours.ink : colours.panel, 2.6);
+  pen.stroke(kind === "skipped" ? colours.ink : colours.panel, 2.6 * share);
 }
 
 /** Arrows at the edge of the map to the rover and the goal while they are out of view. */

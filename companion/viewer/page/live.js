@@ -116,7 +116,7 @@ class LivePage {
       viewer.classList.toggle("truth");
       this.charts.resize(); // there are fewer of them, or more
     }
-    headline.show(scene, frame, trouble);
+    headline.show(scene, frame, trouble, this.link?.open === true);
     legend.show(scene);
     this.panel.show();
     this.charts.show();

@@ -1,23 +1,26 @@
 // The map on a canvas. It draws in the browser's next picture, and only when somebody said that something has changed.
 
 import { theme } from "viewer/colours.js";
+import { outermost } from "viewer/geometry.js";
 import { claimMovers, drawAhead, drawMovers, drawRays, drawRover } from "viewer/layer_drive.js";
-import { claimFrame, drawFrame } from "viewer/layer_frame.js";
+import { claimFrame, drawFrame, drawNothingYet } from "viewer/layer_frame.js";
 import { drawBorders, drawGround } from "viewer/layer_ground.js";
 import { drawMarks, drawPointers } from "viewer/layer_marks.js";
 import { Pen } from "viewer/pen.js";
 
 const SHARPEST = 2; // more canvas pixels than this for one of the page cost time and show nothing
-const MOST_INTEREST = 400;
 const USUAL_SIGHT_M = 8;
 
 export class MapView {
   constructor(canvas, model, camera) {
     Object.assign(this, { canvas, model, camera, waiting: false });
     this.context = canvas.getContext("2d", { alpha: false });
-    /** Functions (pen) of other modules, drawn below or above the rover. */
+    /** Functions (pen) of other modules, drawn below the track, below the marks and their names, or above. */
     this.below = [];
+    this.between = [];
     this.above = [];
+    /** Functions of other modules that give more places which "fit" keeps in view. */
+    this.besides = [];
     this.drawn = 0;
     camera.listeners.add(() => this.invalidate());
     model.listeners.add(() => this.invalidate());
@@ -67,12 +70,14 @@ export class MapView {
     camera.screen(context);
     if (frame) drawRays(pen, frame);
     if (frame) drawAhead(pen, frame);
+    for (const layer of this.between) layer(pen);
     drawMarks(pen, model.scene, frame);
     if (frame) drawMovers(pen, frame);
     for (const layer of this.above) layer(pen);
     drawRover(pen, model.scene, frame?.pose);
     drawPointers(pen, frame);
     drawFrame(pen, model);
+    drawNothingYet(pen, model);
   }
 
   /** As far as the sensor sees; without it the rover alone would fill the map. */
@@ -89,10 +94,11 @@ export class MapView {
     const places = [];
     if (frame?.pose) places.push(frame.pose.slice(0, 2));
     if (frame?.goal) places.push(frame.goal.place);
-    if (frame?.path) places.push(...frame.path.slice(0, MOST_INTEREST));
+    if (frame?.path) places.push(...outermost(frame.path));
     if (scene?.home) places.push(scene.home);
-    places.push(...(scene?.targets ?? []).slice(0, MOST_INTEREST).map((target) => target.place));
+    places.push(...outermost((scene?.targets ?? []).map((target) => target.place)));
     places.push(...(track.bounds() ?? []), ...map.bounds());
+    for (const more of this.besides) places.push(...more());
     if (map.shape && (scene?.truth || places.length < 2)) {
       const { south_m: south, west_m: west, cell_m: cell, rows, columns } = map.shape;
       places.push([south, west], [south + rows * cell, west + columns * cell]);

@@ -1,6 +1,6 @@
 // The list of news, newest first: time, level as colour and sign, text, and who said it.
 
-import { make } from "viewer/dom.js";
+import { make, setText } from "viewer/dom.js";
 import { icon } from "viewer/icons.js";
 import { clock } from "viewer/words.js";
 
@@ -13,6 +13,7 @@ export class NewsList {
     Object.assign(this, { model, jump, shown: 0, last: null });
     this.node = make("ol", { class: "news", "aria-live": "off", "aria-label": "News" });
     this.none = make("li", { class: "nothing" }, "Nothing yet.");
+    this.older = make("li", { class: "nothing" });
     this.node.append(this.none);
   }
 
@@ -25,7 +26,13 @@ export class NewsList {
     const added = (continues ? news.slice(-fresh) : news.slice(-SHOWN)).reverse().map((one) => this.row(one));
     if (continues) this.node.prepend(...added);
     else this.node.replaceChildren(...(added.length ? added : [this.none]));
+    this.older.remove();
     while (this.node.childElementCount > SHOWN) this.node.lastElementChild.remove();
+    const left = newsCount - this.node.childElementCount;
+    if (added.length && left > 0) {
+      setText(this.older, `${left} older ones are not listed.`);
+      this.node.append(this.older);
+    }
     [this.shown, this.last] = [newsCount, news.at(-1)];
   }
 

@@ -1,7 +1,7 @@
 // What is drawn on the map beside the run itself: contacts, and in a report stops and the tracks of other records.
 
 import { make } from "viewer/dom.js";
-import { lastNotAbove } from "viewer/geometry.js";
+import { lastNotAbove, outermost } from "viewer/geometry.js";
 import { star } from "viewer/timeline.js";
 
 const DASHES = [
@@ -71,6 +71,11 @@ export class Others {
       make("h2", {}, "Other records"),
       ...this.others.map(row),
     );
+  }
+
+  /** Where the tracks that are shown lead. */
+  places() {
+    return this.others.filter((other) => other.shown).flatMap((other) => outermost(other.line));
   }
 
   drawTracks(pen) {

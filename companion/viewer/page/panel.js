@@ -63,16 +63,15 @@ export class Panel {
   showTargets() {
     const { scene, frame } = this.model;
     const targets = (scene?.targets ?? []).slice(0, MOST_TARGETS);
-    const key = JSON.stringify(targets.map((target) => [target.name, target.place]));
+    const key = JSON.stringify([scene?.targets?.length, targets.map((target) => [target.name, target.place])]);
     if (key !== this.targetsKey) this.buildTargets(targets, key);
     const ended = frame?.state === "ended";
-    let reached = 0;
+    const reached = (frame?.statuses ?? []).filter((status) => status === "reached").length;
     let seen = false;
     targets.forEach((target, i) => {
       const status = frame?.statuses?.[i] ?? "pending";
       const now = !ended && !seen && status === "pending" && frame?.goal?.name === target.name;
       seen ||= now;
-      if (status === "reached") reached += 1;
       const row = this.targetRows[i];
       setAttribute(row.node, "data-kind", now ? "now" : kindOf(status));
       setIcon(row.sign, now ? "now" : ({ skipped: "skip" }[kindOf(status)] ?? kindOf(status)));
@@ -102,7 +101,11 @@ export class Panel {
       );
       return { node: make("li", {}, button), sign, status, far };
     });
-    this.targets.replaceChildren(...this.targetRows.map((row) => row.node));
+    const left = this.model.scene.targets.length - targets.length;
+    this.targets.replaceChildren(
+      ...this.targetRows.map((row) => row.node),
+      ...(left > 0 ? [make("li", { class: "nothing" }, `${left} more are not listed; the map shows them.`)] : []),
+    );
   }
 }
 

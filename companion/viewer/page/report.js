@@ -74,12 +74,16 @@ class ReportPage {
   }
 
   drawExtras() {
+    this.view.besides.push(() => (this.choosing ? [] : this.others.places()));
     // Candidates and other records together would be a tangle of lines.
     this.view.below.push((pen) => {
       if (!this.choosing) this.others.drawTracks(pen);
     });
+    this.view.between.push((pen) => {
+      if (this.choosing) this.decisions.drawLines(pen); // no name of a target lies under them
+    });
     this.view.above.push((pen) => {
-      if (this.choosing) this.decisions.draw(pen);
+      if (this.choosing) this.decisions.drawCosts(pen);
       else this.others.drawPlaces(pen, this.playback.t);
       const { contacts, events } = this.record;
       const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t).map((one) => one.place);

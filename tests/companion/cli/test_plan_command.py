@@ -239,3 +239,44 @@ def test_a_ros_map_says_its_field_size_itself(tmp_path):
     result = run(file, "--start", "0,0", "--target", "7,0", "--resolution-m", "0.5")
     assert result.exit_code == 2
     assert result.output == f"{file}: --resolution-m: a ROS map says this itself: resolution\n"
+
+
+LIAR = """
+import dataclasses
+from companion.planning.graph_search.astar import Astar
+from companion.planning.problem import Path
+
+class Liar(Astar):
+    name = "liar"
+
+    def plan(self, problem, budget, rng):
+        result = super().plan(problem, budget, rng)
+        path = result.path
+        cells = path.cell_array if self.whole else path.cell_array[[0, -1]]
+        return dataclasses.replace(result, planner="liar", path=Path(cells, 0.125))
+
+    whole = True
+
+class Jumper(Liar):
+    whole = False
+
+class Failing(Liar):
+    def plan(self, problem, budget, rng):
+        raise KeyError("nothing")
+"""
+
+
+def test_the_cost_is_not_what_a_planner_of_ones_own_says(map_file, tmp_path, monkeypatch):
+    (tmp_path / "liars.py").write_text(LIAR)
+    monkeypatch.syspath_prepend(tmp_path)
+    ends = (map_file, "--start", "0,0", "--target", "7,0")
+    honest = json.loads(run(*ends, "--planner", "astar", "--json").stdout)
+    answer = json.loads(run(*ends, "--planner", "liars:Liar", "--json").stdout)
+    assert answer["cost"] == pytest.approx(honest["cost"]) and answer["cost"] > 1.0
+    assert (answer["wrong_cost_of_planner"], honest["wrong_cost_of_planner"]) == (0.125, None)
+    table = shown(run(*ends, "--planner", "liars:Liar").output)
+    assert float(table["cost"]) == pytest.approx(honest["cost"], abs=1e-3)
+    assert table["planner's cost"].startswith("0.125, wrong")
+    for name, words in (("Jumper", "its path is none: not adjacent, at its field 1"), ("Failing", "KeyError")):
+        result = run(*ends, "--planner", f"liars:{name}")
+        assert result.exit_code == 2 and words in result.stderr and result.stderr.count("\n") == 1

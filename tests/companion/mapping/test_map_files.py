@@ -11,7 +11,7 @@ from PIL import Image
 
 from companion.core.frames import NedPoint
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Grid, empty_grid
-from companion.mapping.map_files import MapError, load_map, save_ros_map
+from companion.mapping.map_files import MapError, load_map, save_ros_map, save_weighed_map
 from tests.support.shared_data import SHARED, needs_shared
 
 YAML = (
@@ -233,3 +233,11 @@ def test_real_movingai_maps() -> None:
         blocked = sum(row.count(letter) for row in rows for letter in "@OTW")
         assert int((grid.weights >= OBSTACLE).sum()) == blocked
         assert (grid.weights[-1, 0] >= OBSTACLE) == (rows[0][0] in "@OTW")
+
+
+def test_a_weighed_map_keeps_obstacles_and_weights_in_place(tmp_path: Path) -> None:
+    weights = np.array([[0.5, 0.73, 0.97], [1.0, 0.0, 0.994]])
+    save_weighed_map(Grid(weights, 0.25, NedPoint(-3.5, 7.0)), tmp_path / "why-1-map")
+    read = load_map(tmp_path / "why-1-map.yaml")
+    assert np.allclose(read.weights, [[0.5, 0.73, 0.97], [1.0, 0.5, 0.994]], atol=1e-4)
+    assert (read.resolution_m, read.south_west) == (0.25, NedPoint(-3.5, 7.0))

@@ -7,10 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from companion.core.grid import empty_grid
+from companion.core.frames import Pose
+from companion.core.grid import Cell, empty_grid
+from companion.navigation.field_step import NavState
 from companion.planning.problem import Path
 from companion.planning.raster import CellArray
-from companion.replay.explain import Candidate, cost_of, cost_text
+from companion.replay.explain import Candidate, _rest_of_path, _Scene, cost_of, cost_text
 
 
 def cells(*pairs: tuple[int, int]) -> CellArray:
@@ -38,3 +40,13 @@ def test_cost_and_length_of_a_candidate() -> None:
     )
     assert "1.75" in cost_text(Candidate("a", "", path, 2.0, curve_cost=1.75))
     assert cost_text(Candidate("a", "", None, math.inf)) == "no path"
+
+
+def test_what_is_left_of_a_path_begins_where_the_rover_is_and_costs_what_the_navigator_compares() -> None:
+    grid, path = empty_grid(5, 1), Path(cells((0, 0), (1, 0), (2, 0), (3, 0), (4, 0)), 2.0)
+    state = NavState(Cell(4, 0), (Cell(0, 0),), path)
+    scene = _Scene(Pose(0.0, 2.0, 0.0, 0.0), state, grid, grid, grid, grid.weights < 1.0)
+    here = grid.cell_at(scene.pose.point)
+    rest = _rest_of_path(scene)
+    assert rest.path is not None and rest.path.cells == tuple(Cell(x, 0) for x in range(here.x, 5)) and here.x > 0
+    assert rest.cost == cost_of(grid, rest.path.cell_array) < path.cost and rest.note == "clear"

@@ -17,6 +17,7 @@ from companion.recording.recorder import NullRecorder
 from companion.settings.settings_file import parse_settings
 from companion.viewer import feed, wire
 from companion.viewer.feed import ViewerFeed
+from companion.viewer.frame import frame_of
 from companion.viewer.map_tiles import TILE, cell_classes, cells_of
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
@@ -134,3 +135,9 @@ def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_
     again = Heard()
     ViewerFeed(run.companion, again, {}).show(run.take_status())
     assert again.scenes[0]["run"] != heard.scenes[0]["run"] and len({one["run"] for one in heard.scenes}) == 1
+
+
+def test_a_speed_that_nobody_has_told_is_none() -> None:
+    companion = new_drive().companion
+    frame = frame_of(companion, companion.status())
+    assert frame["pose"] is None and frame["speed"] is None

@@ -1,0 +1,145 @@
+"""What the page tells in words: what a list leaves out, and what is waited for before there is a map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.page_script import needs_node, ran
+
+pytestmark = needs_node
+
+DOCUMENT = """
+globalThis.Path2D = class {};
+globalThis.matchMedia = () => ({ matches: false, addEventListener() {} });
+globalThis.localStorage = { getItem: () => null, setItem() {} };
+class Element {
+  constructor(text = "") {
+    Object.assign(this, { children: [], text, attributes: {}, dataset: {}, style: { setProperty() {} } });
+  }
+  put(nodes) {
+    return nodes.map((one) => {
+      const node = one instanceof Element ? one : new Element(String(one));
+      node.parent = this;
+      return node;
+    });
+  }
+  append(...nodes) { this.children.push(...this.put(nodes)); }
+  prepend(...nodes) { this.children.unshift(...this.put(nodes)); }
+  replaceChildren(...nodes) { this.children = this.put(nodes); }
+  remove() { if (this.parent) this.parent.children = this.parent.children.filter((one) => one !== this); }
+  setAttribute(name, value) { this.attributes[name] = value; }
+  getAttribute(name) { return this.attributes[name] ?? null; }
+  hasAttribute(name) { return name in this.attributes; }
+  removeAttribute(name) { delete this.attributes[name]; }
+  addEventListener(name, call) { this[`on${name}`] = call; }
+  get childElementCount() { return this.children.length; }
+  get firstElementChild() { return this.children[0]; }
+  get lastElementChild() { return this.children.at(-1); }
+  get textContent() { return this.text + this.children.map((one) => one.textContent).join(""); }
+  set textContent(text) { Object.assign(this, { children: [], text }); }
+}
+globalThis.document = {
+  createElement: () => new Element(), createElementNS: () => new Element(), documentElement: new Element(),
+};
+const texts = (node) => node.children.map((one) => one.textContent);
+"""
+
+
+def test_the_news_say_how_many_older_ones_are_not_listed(tmp_path: Path) -> None:
+    script = """
+const { NewsList } = await import("./news.js");
+const news = (count) => Array.from({ length: count }, (_, i) => ({ t: i, level: "info", text: `no. ${i}` }));
+const model = { news: news(400), newsCount: 400, scene: {} };
+const list = new NewsList(model);
+const seen = [];
+const look = () => (list.show(), seen.push([list.node.childElementCount, list.node.lastElementChild.textContent]));
+look();
+model.news = [...model.news, ...news(600).slice(400)].slice(-500);
+model.newsCount = 600;
+look();
+model.news = [...model.news, { t: 600, level: "info", text: "the newest" }].slice(-500);
+model.newsCount = 601;
+look();
+tell([seen, list.node.firstElementChild.textContent]);
+"""
+    seen, newest = ran(tmp_path, DOCUMENT + script)
+    assert seen[0][0] == 400 and "no. 0" in seen[0][1]
+    assert seen[1:] == [[501, "100 older ones are not listed."], [501, "101 older ones are not listed."]]
+    assert "the newest" in newest
+
+
+def test_targets_and_decisions_that_are_not_listed_are_told(tmp_path: Path) -> None:
+    script = """
+const { Decisions } = await import("./decisions.js");
+const { Panel } = await import("./panel.js");
+const targets = Array.from({ length: 250 }, (_, i) => ({ name: `t${i}`, place: [i, 0] }));
+const frame = { statuses: targets.map(() => "reached"), state: "ended" };
+const panel = new Panel({ scene: { targets }, frame, news: [], newsCount: 0 }, {});
+panel.showTargets();
+const times = Array.from({ length: 300 }, (_, i) => i);
+const decisions = times.map((t) => ({ t, number: t + 1, action: "follow", reason: "" }));
+let to = null;
+const list = new Decisions({ decisions, decisionTimes: times, scene: {} }, (t) => { to = t; });
+list.show(150);
+const rows = list.list.children;
+const current = rows.filter((row) => row.attributes["aria-current"]).map((row) => row.textContent);
+rows.at(-1).children[0].onclick();
+tell([panel.targetsHead.textContent, texts(panel.targets).at(-1), rows.length, texts(list.list), current, to]);
+"""
+    head, last, rows, lines, current, to = ran(tmp_path, DOCUMENT + script)
+    assert head == "Targets, 250 of 250 reached" and last == "50 more are not listed; the map shows them."
+    assert (rows, lines[0], lines[-1], to) == (122, "90 earlier decisions", "90 later decisions", 210)
+    assert len(current) == 1 and "151" in current[0]
+
+
+def test_all_on_the_map_shows_the_last_target_and_other_records(tmp_path: Path) -> None:
+    script = """
+const { MapView } = await import("./map_view.js");
+const { Others } = await import("./overlays.js");
+const targets = Array.from({ length: 1000 }, (_, i) => ({ name: "", place: [i, -i] }));
+const path = Array.from({ length: 1000 }, (_, i) => [0, 2 * i]);
+const others = new Others([{ name: "b", track: [[0, -50, 0], [1, -70, 0]], elsewhere: false }], 0, () => {});
+const model = {
+  scene: { targets, home: [0, 0] }, frame: { path }, track: { bounds: () => null }, map: { bounds: () => [] },
+};
+const places = MapView.prototype.interest.call({ model, besides: [() => others.places()] });
+const [norths, easts] = [0, 1].map((axis) => places.map((place) => place[axis]));
+tell([Math.min(...norths), Math.max(...norths), Math.min(...easts), Math.max(...easts)]);
+"""
+    assert ran(tmp_path, DOCUMENT + script) == [-70, 999, -999, 1998]
+
+
+def test_before_the_autopilot_is_heard_the_page_says_what_it_waits_for(tmp_path: Path) -> None:
+    script = """
+const { Headline } = await import("./headline.js");
+const { drawNothingYet } = await import("./layer_frame.js");
+const headline = new Headline();
+const frame = { state: "connecting", line: "waiting for the autopilot's heartbeat on udpin:0.0.0.0:14550", t: 1 };
+const heads = [[null, false], [null, true], [frame, true]].map(([moment, open]) => {
+  headline.show(null, moment, "", open);
+  return headline.line.textContent;
+});
+const drawn = (model) => {
+  const texts = [];
+  const context = { beginPath() {}, roundRect() {}, fill() {} };
+  const camera = { width: 400, height: 300, coveredRight: 60, covered: 0 };
+  const pen = { context, camera, colours: {}, widthOf: () => 100, text: (text) => texts.push(text) };
+  drawNothingYet(pen, { map: {}, scene: {}, ...model });
+  return texts;
+};
+tell([heads, drawn({ frame }), drawn({ frame: { pose: [0, 0, 0] } }), drawn({ frame, map: { shape: {} } })]);
+"""
+    heads, before, placed, mapped = ran(tmp_path, DOCUMENT + script)
+    assert heads[:2] == ["Connecting", "Waiting for the run to begin"]
+    assert heads[2] == "Waiting for the autopilot's heartbeat on udpin:0.0.0.0:14550"
+    assert before == ["No position of the rover yet", "The map begins with it"] and placed == mapped == []
+
+
+def test_marks_that_would_cover_each_other_are_smaller(tmp_path: Path) -> None:
+    script = """
+const { radii } = await import("./layer_marks.js");
+tell(radii([[100, 50], [0, 0], [116, 50], [100, 50.5], [100, 200], [110, 218]]));
+"""
+    assert ran(tmp_path, DOCUMENT + script) == [6, 12, 7, 6, pytest.approx(9.3, abs=0.1), pytest.approx(9.3, abs=0.1)]
