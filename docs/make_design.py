@@ -7,8 +7,10 @@ another.``, lists the nouns whose home it is. A test compares the page with the 
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,13 +36,14 @@ class Module:
     nouns: tuple[str, ...]
 
 
-def modules(root: Path = ROOT) -> list[Module]:
+@functools.cache
+def modules(root: Path = ROOT) -> tuple[Module, ...]:
     """All modules of both programs, packages before what is in them, ordered by path. Raises DesignError."""
     found = []
     for package in PACKAGES:
         files = sorted((root / package).rglob("*.py"), key=lambda file: (file.parent, file.name != "__init__.py", file))
         found += [_module(file, root) for file in files if file.name != "__init__.py" or file.parent != root / package]
-    return found
+    return tuple(found)
 
 
 def _module(file: Path, root: Path) -> Module:
@@ -53,7 +56,7 @@ def _module(file: Path, root: Path) -> Module:
     return Module(path, says, tuple(" ".join(noun.split()) for noun in nouns[1].split(",")) if nouns else ())
 
 
-def layout(found: list[Module]) -> str:
+def layout(found: Sequence[Module]) -> str:
     """The tree with what each module says."""
     lines = []
     for package in PACKAGES:
@@ -80,7 +83,7 @@ def _order(path: str) -> list[tuple[bool, str]]:
     return [(i < len(parts) - 1 or is_package, part) for i, part in enumerate(parts)]
 
 
-def noun_table(found: list[Module]) -> str:
+def noun_table(found: Sequence[Module]) -> str:
     """Every noun and its home, by the alphabet. Raises DesignError for a noun with two homes."""
     homes: dict[str, str] = {}
     for module in found:
