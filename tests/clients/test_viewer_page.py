@@ -117,6 +117,23 @@ return import('viewer/camera.js').then(({ Camera }) => {
 """Keeps the map's camera where a test finds it."""
 
 
+LOSE_PLACE = """
+return import('viewer/model.js').then(({ Model }) => {
+    const take = Model.prototype.takeFrame;
+    Model.prototype.takeFrame = function (frame) {
+        return take.call(this, { ...frame, rates: { ...frame.rates, position_age_s: 60 } });
+    };
+})
+"""
+"""From now on no position is heard."""
+STRUCK = """
+return [...document.querySelectorAll('.fact')].filter(one =>
+    getComputedStyle(one.querySelector('dd')).textDecorationLine === 'line-through')
+    .map(one => one.querySelector('dt').textContent)
+"""
+"""Facts that are shown as old."""
+
+
 PILOT = """
 [[fault]]
 kind = "pilot"
@@ -196,6 +213,10 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows(f"Leave out {name}?")
             fits(desktop, PHONE)
             zooms(desktop, lambda: desktop.spread("canvas.map", 30, 90))
+            assert desktop.run(STRUCK) == []
+            desktop.run(LOSE_PLACE)
+            desktop.until(lambda: desktop.run(STRUCK) == ["Goal", "Setpoint", "Position"])
+            assert "grayscale" in str(desktop.run("return getComputedStyle(document.querySelector('.map')).filter"))
             desktop.run("sessionStorage.clear(); localStorage.clear()")
             desktop.open("about:blank")
             desktop.open(address)
