@@ -34,11 +34,9 @@ class LastPlace:
         if knows_place(vehicle):
             self._pose, self._time_s = frame["pose"], now_s
             return frame
-        rates, age_s = frame["rates"], None if self._pose is None else round(now_s - self._time_s, 1)
-        return {
-            **frame,
-            "pose": self._pose,
-            "rays": None,
-            "figures": {**frame["figures"], "clearance_m": None},
-            "rates": {**rates, "position_age_s": max(filter(None, (rates["position_age_s"], age_s)), default=None)},
-        }
+        rates = frame["rates"]
+        if self._pose is not None:
+            age_s = round(now_s - self._time_s, 1)
+            rates = {**rates, "position_age_s": max(rates["position_age_s"] or 0.0, age_s)}
+        figures = {**frame["figures"], "clearance_m": None}
+        return {**frame, "pose": self._pose, "rays": None, "figures": figures, "rates": rates}
