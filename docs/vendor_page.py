@@ -1,8 +1,9 @@
 """Copies the JavaScript libraries of the viewer's page from npm: ``.venv/bin/python docs/vendor_page.py``.
 
 The copies are in the repository; nobody needs this to use the viewer. The lock file beside them names each library's
-version and the sha512 of its package. A package with another sum is refused. ``--update uplot=1.6.32`` writes the lock
-anew, for a version or, without one, for the newest.
+version and the sha512 of its package, and of each file that is copied, so that a test can compare without a network. A
+package with another sum is refused. ``--update uplot=1.6.32`` writes the lock anew, for a version or, without one, for
+the newest.
 """
 
 from __future__ import annotations
@@ -48,9 +49,9 @@ def _packed(name: str, version: str, folder: Path) -> Path:
     return next(folder.glob("*.tgz"))
 
 
-def _integrity(tarball: Path) -> str:
-    digest = hashlib.sha512(tarball.read_bytes()).digest()
-    return "sha512-" + base64.b64encode(digest).decode("ascii")
+def integrity(data: bytes) -> str:
+    """The sum of a package or a file, as npm writes it."""
+    return "sha512-" + base64.b64encode(hashlib.sha512(data).digest()).decode("ascii")
 
 
 def _describe(package: dict[str, Any], tarball: Path) -> None:
@@ -58,11 +59,13 @@ def _describe(package: dict[str, Any], tarball: Path) -> None:
     described = json.loads(_member(tarball, "package.json"))
     package["version"] = described["version"]
     package["licence"] = described["license"]
-    package["integrity"] = _integrity(tarball)
+    package["integrity"] = integrity(tarball.read_bytes())
+    for file in package["files"].values():
+        file["integrity"] = integrity(_member(tarball, file["of"]))
 
 
 def _check(package: dict[str, Any], tarball: Path) -> None:
-    found = _integrity(tarball)
+    found = integrity(tarball.read_bytes())
     if found != package["integrity"]:
         raise SystemExit(
             f"{package['name']} {package['version']}: {found} is not {package['integrity']} of {LOCK.name}"
@@ -70,9 +73,9 @@ def _check(package: dict[str, Any], tarball: Path) -> None:
 
 
 def _copy(package: dict[str, Any], tarball: Path) -> None:
-    """Copies the files that the lock names: ``{file here: file in the package}``."""
-    for here, there in package["files"].items():
-        (VENDOR / here).write_bytes(_member(tarball, there))
+    """Copies the files that the lock names: ``{file here: {"of": file in the package, "integrity": its sum}}``."""
+    for here, file in package["files"].items():
+        (VENDOR / here).write_bytes(_member(tarball, file["of"]))
         print(f"{here}: {package['name']} {package['version']}")
 
 

@@ -17,6 +17,7 @@ from companion.core.clock import stopwatch_s
 from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of, told
+from companion.viewer.last_place import LastPlace
 from companion.viewer.map_tiles import TileWatch
 from companion.viewer.retelling import Receiver, Retelling, run_id
 from companion.viewer.steady_frame import SteadyFrame
@@ -43,6 +44,7 @@ class ViewerFeed:
         self._news: list[Json] = []
         self._retelling = Retelling(receiver)
         self._rates = Arrivals()
+        self._last_place = LastPlace()
         self.steady = SteadyFrame()
         self.touched: Sequence[Sequence[float]] | None = None
         """Where a simulated rover touched something, north and east; whoever knows it writes it here."""
@@ -126,7 +128,7 @@ class ViewerFeed:
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
         frame["contacts"] = None if self.touched is None else len(self.touched)
         frame["touched"] = list((self.touched or ())[-TOUCHED_KEPT:])
-        return frame
+        return self._last_place.told(frame, self._companion.vehicle, status.time_s)
 
     def _put(self, message: Json) -> bool:
         return self._receiver.put(wire.JSON, json.dumps(message, allow_nan=False).encode())

@@ -27,6 +27,7 @@ from companion.replay.replay import ReplayObserver, ReplayResult, replay
 from companion.safety.reasons import EndReason, Reason
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import doing_of, frame_of, news_of, scene_of
+from companion.viewer.last_place import LastPlace
 from companion.viewer.map_tiles import TileWatch
 from companion.viewer.report_tables import Run, differences, tables_of
 from companion.viewer.run_tally import RunTally
@@ -129,7 +130,7 @@ class ReportWatch(ReplayObserver):
         self._frame_s = self._path_s = self._tiles_s = -math.inf
         self._watch: TileWatch | None = None
         self._evidence: object = None
-        self._steady = SteadyFrame()
+        self._steady, self._last_place = SteadyFrame(), LastPlace()
         self.maps: list[tuple[float, Json | None]] = []
         """From when on which map is shown: another one begins where the companion begins it anew."""
 
@@ -176,6 +177,7 @@ class ReportWatch(ReplayObserver):
         frame = self._steady.frame(frame_of(companion, status))
         frame.update({"t": round(time_s, 2), "news": self._news})
         frame["rates"] = self._rates.at(companion.vehicle, status.time_s)
+        frame = self._last_place.told(frame, companion.vehicle, status.time_s)
         frame["figures"].update(tick_ms=None, planning_ms=None)  # of the replay, not of the run
         if time_s - self._path_s < PATH_S and frame["path"] and self._before.get("path"):
             frame["path"] = self._before["path"]

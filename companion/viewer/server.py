@@ -16,6 +16,7 @@ import hashlib
 import hmac
 import ipaddress
 import json
+import math
 import re
 import secrets
 import socket
@@ -32,6 +33,7 @@ from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from companion.viewer import wire
 from companion.viewer.live_board import LiveBoard, Spectator
@@ -45,6 +47,8 @@ MOST_BYTES = 2048
 MOST_NAME = 200
 HELLO_S, SEND_S = 10.0, 20.0
 ACTIONS_A_SECOND = 5
+MOST_BYTES_A_SECOND = 8 * MOST_BYTES
+"""Of a browser, more than all that is passed on; whoever sends more is ended."""
 WRONG_TOKEN_S = 0.5
 BEAT_S, BEAT = 2.0, json.dumps({"kind": "beat"})
 """After so long without a word a browser is told that somebody is there: nothing else ends a half-open connection."""
@@ -234,6 +238,24 @@ class _Files(StaticFiles):
         return response
 
 
+class _Counted(WebSocketsSansIOProtocol):
+    """Ends a browser that floods, before its bytes are looked at: the library takes each ping, each pong and each empty
+    part of a message at once, and nobody else hears of them."""
+
+    _since_s, _got = -math.inf, 0
+
+    def data_received(self, data: bytes) -> None:
+        now_s = self.loop.time()
+        if now_s - self._since_s >= 1.0:
+            self._since_s, self._got = now_s, 0
+        if self.handshake_initiated:  # the request before it may be large: it has the cookies of this host
+            self._got += len(data)
+        if self._got > MOST_BYTES_A_SECOND:
+            self.transport.abort()
+        else:
+            super().data_received(data)
+
+
 def _is_number(value: object, most: float) -> bool:
     """Whether it is a number within bounds; an integer of hundreds of digits is no float."""
     return isinstance(value, int | float) and not isinstance(value, bool) and -most < value < most
@@ -333,7 +355,7 @@ async def _run(descriptor: int) -> None:
     config = uvicorn.Config(
         app.routes(),
         log_level="critical",
-        ws="websockets-sansio",
+        ws=_Counted,
         ws_max_size=MOST_BYTES,
         ws_per_message_deflate=False,
         lifespan="off",

@@ -46,6 +46,8 @@ field = [1060, 1040]
 TICK_S = 0.05
 DRIVEN_S, REPETITIONS = 12.0, 8
 READERS = 50
+BLOCK_S, BLOCKS = 1.5, 8
+"""Parts of one drive, in turn with a page and without."""
 RATIO_LIMIT = 1.5
 """Of the 99th percentiles, with a crowd and without anybody. On a busy machine both are several times what they are on
 a quiet one."""
@@ -164,6 +166,49 @@ def crowded() -> np.ndarray:
     again = [connections for connections in got if len(connections) >= 2 and connections[-1] > 10_000]
     assert len(again) == READERS, got
     return took_ms
+
+
+def in_turn_ms(first: bool) -> dict[bool, np.ndarray]:
+    """Of one drive in blocks: ticks with a crowd before the page, and without a page. ``first``: which comes first.
+
+    Without one nothing is told, and neither the web process nor the crowd runs.
+    """
+    run, took_ms = begun(), {True: [], False: []}
+    with page_of(run, []) as viewer, crowd(viewer.web.place.port, READERS) as people:
+        ticks_ms(run, viewer, SETTLED_S, lambda: None)
+        assert viewer.web.process_id is not None
+        others = (viewer.web.process_id, people.pid)
+        try:
+            for number in range(BLOCKS):
+                seen = first == (number % 2 == 0)
+                for one in others:
+                    os.kill(one, signal.SIGCONT if seen else signal.SIGSTOP)
+                took_ms[seen].append(ticks_ms(run, viewer if seen else None, BLOCK_S, lambda: None))
+        finally:
+            for one in others:
+                os.kill(one, signal.SIGCONT)
+        got = json.loads(people.communicate("", timeout=20.0)[0])
+        assert viewer.web.started == 1 and len([one for one in got if sum(one) > 10_000]) == READERS
+    return {seen: np.hstack(blocks) for seen, blocks in took_ms.items()}
+
+
+def test_ticks_in_turn_with_a_crowd_and_without_a_page() -> None:
+    """Within one run, block by block; what one drive does with a page, the next one does without."""
+    begun()
+    drives = [in_turn_ms(first=number % 2 == 0) for number in range(REPETITIONS)]
+    took_ms = {seen: np.hstack([one[seen] for one in drives]) for seen in (True, False)}
+    p99 = {seen: np.percentile(took_ms[seen], 99.0, axis=1) for seen in took_ms}
+    halves = [np.hstack([one[seen] for one in drives[part::2]]) for part in (0, 1) for seen in (True, False)]
+    spread = [np.percentile(half[0], 99.0) for half in halves]
+    for seen, name in ((False, "without a page"), (True, "fifty browsers")):
+        time_ms, work_ms = p99[seen]
+        print(f"\ntick p99 in turn, {name}: {time_ms:.2f} ms of time, {work_ms:.2f} ms of work", end="")
+    ratio, work_ratio = p99[True] / p99[False]
+    print(
+        f"\nwith over without: {ratio:.2f} times as long ({spread[0] / spread[1]:.2f} and {spread[2] / spread[3]:.2f} "
+        f"in halves of the drives), {work_ratio:.2f} times the work; {took_ms[True].shape[1]} ticks each"
+    )
+    assert ratio < RATIO_LIMIT and work_ratio < RATIO_LIMIT
 
 
 def medians_ms(setups: dict[str, Callable[[], np.ndarray]], repetitions: int) -> dict[str, np.ndarray]:

@@ -15,6 +15,7 @@ from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
 from selenium.webdriver.common.by import By
 
 from tests.support.served import PATIENCE_S
@@ -85,6 +86,22 @@ class Page:
         element = self.driver.find_element(By.CSS_SELECTOR, selector)
         chain = ActionChains(self.driver, duration=50).move_to_element(element).click_and_hold()
         chain.move_by_offset(right, down).release().perform()
+
+    def turn_wheel(self, selector: str, down: int) -> None:
+        """So far over the middle of the first element, with the mouse."""
+        origin = ScrollOrigin.from_element(self.driver.find_element(By.CSS_SELECTOR, selector))
+        ActionChains(self.driver).scroll_from_origin(origin, 0, down).perform()
+
+    def spread(self, selector: str, before: int, after: int) -> None:
+        """Two fingers beside the middle of the first element, each so far from it before and after."""
+        box = self.driver.find_element(By.CSS_SELECTOR, selector).rect
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        for kind, off in (("touchStart", before), ("touchMove", (before + after) // 2), ("touchMove", after)):
+            self._touch(kind, [{"x": x - off, "y": y, "id": 0}, {"x": x + off, "y": y, "id": 1}])
+        self._touch("touchEnd", [])
+
+    def _touch(self, kind: str, points: list[dict[str, float]]) -> None:
+        self.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
     def darken(self) -> None:
         """As on a system that is set to dark."""

@@ -6,6 +6,7 @@ import os
 import re
 import signal
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -81,6 +82,58 @@ PRESSED = "return [...document.querySelectorAll('.map-buttons [aria-pressed=true
 """Buttons over the map that are pressed."""
 
 
+FACTS = """
+const text = (one, name) => one.querySelector(name).innerText;
+return Object.fromEntries([...document.querySelectorAll('.fact')].map(one => [text(one, 'dt'), text(one, 'dd')]))
+"""
+TOLD = {
+    "Link": r"good, \d+ ms",
+    "Position": r"\d+\.\d a second",
+    "Range sensor": r"\d+\.\d a second",
+    "GPS": r".+, \d+ satellites",
+    "Battery": r"\d+ %, \d+\.\d V",
+    "Tick": r"\d+\.\d ms",
+}
+"""What some of the facts say while the rover drives."""
+FIGURES = """
+return Object.fromEntries([...document.querySelectorAll('.chart')].map(one => {
+    const canvas = one.querySelector('canvas'), colour = getComputedStyle(document.body).getPropertyValue('--accent');
+    const wanted = [1, 3, 5].map(at => parseInt(colour.trim().slice(at, at + 2), 16));
+    const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+    let columns = new Set();
+    for (let i = 0; i < data.length; i += 4)
+        if (data[i + 3] > 200 && wanted.every((part, j) => Math.abs(part - data[i + j]) < 30))
+            columns.add(i / 4 % canvas.width);
+    return [one.querySelector('h3').innerText.replace(/[^a-z].*/is, ''), columns.size]
+}))
+"""
+"""Of each figure: over how many columns of pixels its line goes."""
+CAMERA = """
+return import('viewer/camera.js').then(({ Camera }) => {
+    const hold = Camera.prototype.hold;
+    Camera.prototype.hold = function (...all) { window.camera = this; return hold.apply(this, all) };
+})
+"""
+"""Keeps the map's camera where a test finds it."""
+
+
+LOSE_PLACE = """
+return import('viewer/model.js').then(({ Model }) => {
+    const take = Model.prototype.takeFrame;
+    Model.prototype.takeFrame = function (frame) {
+        return take.call(this, { ...frame, rates: { ...frame.rates, position_age_s: 60 } });
+    };
+})
+"""
+"""From now on no position is heard."""
+STRUCK = """
+return [...document.querySelectorAll('.fact')].filter(one =>
+    getComputedStyle(one.querySelector('dd')).textDecorationLine === 'line-through')
+    .map(one => one.querySelector('dt').textContent)
+"""
+"""Facts that are shown as old."""
+
+
 PILOT = """
 [[fault]]
 kind = "pilot"
@@ -119,6 +172,12 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows(f"Driving to {name}", "GUIDED", f"Heading for {name}", "companion")
             assert int(str(desktop.run(DRAWN))) > 8
             fits(desktop, DESKTOP)
+            desktop.until(lambda: {name: text for name, text in TOLD.items()
+                                   if not re.fullmatch(text, desktop.run(FACTS).get(name, ""))} == {})  # fmt: skip
+            desktop.until(lambda: min(desktop.run(FIGURES).values()) > 5)
+            desktop.run(CAMERA)
+            zooms(desktop, lambda: desktop.turn_wheel("canvas.map", -300))
+            desktop.press("Show everything (0)")
             killed = web_process_of(program)
             assert killed is not None
             os.kill(killed, signal.SIGKILL)
@@ -153,6 +212,11 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.press("Skip target")
             desktop.shows(f"Leave out {name}?")
             fits(desktop, PHONE)
+            zooms(desktop, lambda: desktop.spread("canvas.map", 30, 90))
+            assert desktop.run(STRUCK) == []
+            desktop.run(LOSE_PLACE)
+            desktop.until(lambda: desktop.run(STRUCK) == ["Goal", "Setpoint", "Position"])
+            assert "grayscale" in str(desktop.run("return getComputedStyle(document.querySelector('.map')).filter"))
             desktop.run("sessionStorage.clear(); localStorage.clear()")
             desktop.open("about:blank")
             desktop.open(address)
@@ -185,6 +249,16 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
                 desktop.press("Go on")
                 desktop.shows("Request refused: it was not paused by a request", "The pilot drives (MANUAL)")
                 another.child.send_signal(signal.SIGINT)
+
+
+def zooms(shown: Page, how: Callable[[], None]) -> None:
+    """The map is larger afterwards, and a person has moved it."""
+    scale = "return window.camera?.scale ?? 0"
+    shown.until(lambda: float(shown.run(scale)) > 0.0)
+    before = float(shown.run(scale))
+    how()
+    shown.until(lambda: float(shown.run(scale)) > 1.3 * before)
+    assert shown.run(PRESSED) in ([], ["Figures"])
 
 
 def fits(shown: Page, size: tuple[int, int]) -> None:

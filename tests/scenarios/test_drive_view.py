@@ -25,6 +25,7 @@ from companion.viewer import feed
 from companion.viewer.feed import ViewerFeed
 from companion.viewer.report_data import ReportWatch
 from companion.viewer.terminal.painter import MakeView, Painter
+from companion.viewer.terminal.run_view import RunView
 from companion.viewer.terminal.screen import View
 from companion.viewer.terminal.sketch import Kind
 from companion.viewer.wire import JSON
@@ -65,6 +66,8 @@ class Driven:
     told: list[dict[str, Any]] = field(default_factory=list)
     """What the page is told."""
     record: Path = Path()
+    rovers: list[tuple[float, float, float]] = field(default_factory=list)
+    """Where the terminal of the real run shows it: time, north, east."""
 
 
 class Page:
@@ -87,11 +90,15 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
     recorder = Recorder(record, mission, Settings(), 0, arm=True, start_us=0)
     run, viewer, page = Drive(mission, scenario, Settings(), 0, recorder, 120.0), Kept(), Page()
     shown, fed, statuses = DriveView(run, viewer), ViewerFeed(run.companion, page, {}), []
+    terminal, rovers = RunView(run.companion, "yard"), []
 
     def observe(status: Status) -> None:
         statuses.append(status)
         shown.observe(status)
         fed.show(status)
+        terminal.note(status)
+        if (rover := terminal.view(status)().sketch.rover) is not None:
+            rovers.append((status.time_s, rover.north_m, rover.east_m))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(feed, "FRAME_S", -1.0)
@@ -99,7 +106,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
         shown.finish(run.run(observe))
     recorder.close()
     assert any("EKF origin moved" in text for text in run.companion.outcome.said)
-    yield Driven(run, viewer.views, statuses, page.told, record)
+    yield Driven(run, viewer.views, statuses, page.told, record, rovers)
 
 
 @pytest.mark.thorough
@@ -116,16 +123,21 @@ def test_targets_and_walls_stay_where_they_are_when_the_autopilot_counts_from_el
         assert (seen.south_m, seen.west_m) == pytest.approx((0.0, 0.0), abs=1.0)
 
 
-@pytest.mark.thorough
-def test_on_the_page_and_in_the_report_they_stay_too(driven: Driven) -> None:
+@pytest.fixture(scope="module")
+def watch(driven: Driven) -> ReportWatch:
+    """What a report has of it."""
+    record = load_record(driven.record)
+    watch = ReportWatch(record)
+    replay(record, watch)
+    return watch
+
+
+def test_on_the_page_and_in_the_report_they_stay_too(driven: Driven, watch: ReportWatch) -> None:
     places = [one["targets"][0]["place"] for one in driven.told if one["kind"] == "scene" and one["targets"]]
     assert len({one["map_epoch"] for one in driven.told if one["kind"] == "scene"}) == 3
     assert len(places) > 1 and np.ptp(places, axis=0).max() < 0.1
     frames = [one for one in driven.told if one["kind"] == "frame" and one["goal"]]
     assert np.ptp([one["goal"]["place"] for one in frames], axis=0).max() < 0.1
-    record = load_record(driven.record)
-    watch = ReportWatch(record)
-    replay(record, watch)
     assert watch.scene["targets"][0]["place"] == pytest.approx(places[0], abs=0.1)
     goals = [one["goal"]["place"] for one in watch.frames if one.get("goal")]
     assert np.ptp(goals, axis=0).max() < 0.1
@@ -134,6 +146,32 @@ def test_on_the_page_and_in_the_report_they_stay_too(driven: Driven) -> None:
     assert (before["south_m"], before["west_m"]) == pytest.approx((after["south_m"], after["west_m"]), abs=1.0)
     ends = [one["pose"] for one in (frames[0], frames[-1])]
     assert math.dist(ends[0][:2], ends[1][:2]) > 2.0, "where it had driven before the failure"
+
+
+def test_a_rover_whose_autopilot_does_not_know_where_it_is_is_shown_where_it_was_and_as_old(
+    driven: Driven, watch: ReportWatch
+) -> None:
+    lost_s = next(status.time_s for status in driven.statuses if "silent" in status.doing)
+    begins_s = next(one["t"] for one in driven.told if one["kind"] == "frame" and one["state"] == "driving")
+    for frames in ([one for one in driven.told if one["kind"] == "frame"], whole_frames(watch)):
+        stood = [one for one in frames if one["t"] > lost_s]
+        assert len(stood) > 100 and np.ptp([one["pose"][:2] for one in stood], axis=0).max() < 1.0
+        assert math.dist(stood[0]["pose"][:2], (0.0, 0.0)) > 2.0
+        unknown = [one for one in stood if "EKF has no position" in one["line"]]
+        assert len(unknown) > 20 and all(one["rates"]["position_age_s"] > 1.5 and not one["rays"] for one in unknown)
+        assert stood[-1]["rates"]["position_age_s"] < 0.5, "it knows again"
+        first = next(one for one in frames if one["pose"])
+        assert first["t"] < begins_s, "before the mission, but not before the autopilot knows"
+    near_home = [one for one in driven.rovers if one[0] > lost_s and math.hypot(*one[1:]) < 0.01]
+    assert len(driven.rovers) > 50 and near_home == [], "nor is it on the terminal"
+
+
+def whole_frames(watch: ReportWatch) -> list[dict[str, Any]]:
+    """The frames of a report, each with what has not changed since the one before."""
+    frames: list[dict[str, Any]] = []
+    for one in watch.frames:
+        frames.append({**(frames[-1] if frames else {}), **one})
+    return frames
 
 
 def test_the_picture_has_the_target_there_too(driven: Driven, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 from PIL import Image
@@ -28,7 +29,8 @@ from companion.viewer import frame, map_tiles, report_data, report_mcap
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
 from companion.viewer.frame import doing_of
 from companion.viewer.report_csv import FILES
-from companion.viewer.report_data import ReportWatch, counted, joined, run_of
+from companion.viewer.report_data import ReportWatch, as_json, counted, joined, run_of
+from companion.viewer.report_page import report_page
 from companion.viewer.report_tables import tables_of
 from companion.viewer.run_tally import RunTally
 from companion.viewer.wire import tiles_in
@@ -113,6 +115,52 @@ def test_the_page_of_a_report_knows_how_often_data_came(made: Path) -> None:
     middle = rates[len(rates) // 2]
     assert 5.0 < middle["position"] < 25.0 and 5.0 < middle["range"] < 25.0
     assert middle["heartbeat_age_s"] < 1.5 and middle["position_age_s"] < 0.3
+
+
+LAPS_S = 600.0
+"""So long a drive is what the size of a report is told for."""
+
+
+def driven_on(data: dict[str, Any], seconds: float) -> dict[str, Any]:
+    """The data of a report whose drive goes on for so long: its moments again and again, with as many rays as a frame
+    may have, and each time with other numbers and tiles, so that nothing is packed as a copy of the lap before."""
+    rng = np.random.default_rng(0)
+    begin_s, end_s = next(one["t"] for one in data["frames"] if one.get("state") == "driving"), data["frames"][-1]["t"]
+    lap_s = end_s - begin_s
+
+    def other(value: Any) -> Any:
+        match value:
+            case float():
+                return round(value + rng.uniform(-0.5, 0.5), 3)
+            case list():
+                return [other(one) for one in value]
+            case dict():
+                return {key: other(one) for key, one in value.items()}
+        return value
+
+    def again(one: dict[str, Any], lap: int) -> dict[str, Any]:
+        copy = {**other(one), "t": round(one["t"] + lap * lap_s, 2)}
+        if copy.get("rays"):
+            copy["rays"]["m"] = np.round(rng.uniform(0.3, 8.0, frame.MOST_RAYS), 2).tolist()
+        return copy
+
+    def mixed(tile: str) -> str:
+        return base64.b64encode(rng.permutation(list(base64.b64decode(tile))).astype(np.uint8).tobytes()).decode()
+
+    laps = range(1, round(seconds / lap_s) + 1)
+    for name in ("frames", "decisions"):
+        driven = [one for one in data[name] if one["t"] >= begin_s]
+        data[name] += [again(one, lap) for lap in laps for one in driven]
+    driven = [(time_s, tile) for time_s, tile in data["tiles"] if time_s >= begin_s]
+    data["tiles"] += [[time_s + lap * lap_s, mixed(tile)] for lap in laps for time_s, tile in driven]
+    return data
+
+
+def test_ten_minutes_of_driving_make_a_report_of_less_than_five_megabytes(made: Path) -> None:
+    data = driven_on(report_data_in(made / "r.html"), LAPS_S)
+    driven = [one for one in data["frames"] if one["t"] >= data["frames"][-1]["t"] - LAPS_S]
+    assert len(driven) > 1400 and len(data["decisions"]) > 1000
+    assert 1_000_000 < len(report_page("Yard", as_json(data)).encode()) < 5_000_000
 
 
 REQUIRED = {

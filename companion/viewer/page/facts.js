@@ -8,6 +8,9 @@ const LOST_HEARTBEAT_S = 6;
 const SLOW_HZ = 1;
 const LOW_PERCENT = 20;
 
+/** Facts that say nothing any more when it is not known where the rover is. */
+export const OF_PLACE = new Set(["Goal", "Setpoint", "Position"]);
+
 /** The three large numbers: [name, value, unit]. */
 export function readouts(frame) {
   const goal = frame?.goal;

@@ -109,9 +109,11 @@ class LivePage {
     const { viewer, headline, legend } = this.parts;
     const { scene, frame } = this.model;
     const trouble = this.trouble();
-    const old = frame?.state !== "ended" && frame?.rates?.position_age_s > OLD_POSITION_S;
-    this.charts.stale = old || trouble !== "" || (frame !== null && this.silentFor() > STALE_MS);
+    const lost = frame?.state !== "ended" && frame?.rates?.position_age_s > OLD_POSITION_S;
+    const silent = trouble !== "" || (frame !== null && this.silentFor() > STALE_MS);
+    this.charts.stale = lost || silent;
     viewer.classList.toggle("stale", this.charts.stale);
+    viewer.classList.toggle("lost", lost && !silent); // where it is, is old; mode and battery are not
     if (viewer.classList.contains("truth") !== (scene?.truth === true)) {
       viewer.classList.toggle("truth");
       this.charts.resize(); // there are fewer of them, or more

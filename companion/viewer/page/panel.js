@@ -1,7 +1,7 @@
 // The panel beside the map: large numbers, news, targets, facts.
 
 import { make, setAttribute, setText } from "viewer/dom.js";
-import { facts, readouts, trueFacts } from "viewer/facts.js";
+import { facts, OF_PLACE, readouts, trueFacts } from "viewer/facts.js";
 import { distance } from "viewer/geometry.js";
 import { setIcon } from "viewer/icons.js";
 import { kindOf } from "viewer/layer_marks.js";
@@ -48,6 +48,7 @@ export class Panel {
       setText(this.rows[i].name, name);
       setText(this.rows[i].value, value);
       setAttribute(this.rows[i].row, "data-level", level);
+      setAttribute(this.rows[i].row, "data-place", OF_PLACE.has(name) ? "" : null);
       setIcon(this.rows[i].sign, level ?? "good");
     });
     while (this.rows.length > list.length) this.rows.pop().row.remove(); // a link that has gone

@@ -15,9 +15,10 @@ from collections import deque
 import numpy as np
 
 from companion.app import Companion, Status
-from companion.core.frames import NedPoint
+from companion.core.frames import NedPoint, Pose
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import mode_of
+from companion.viewer.last_place import knows_place
 from companion.viewer.terminal.facts import Fact, Section
 from companion.viewer.terminal.known import headline_of, known_layers, mission_section, path_ahead, target_places
 from companion.viewer.terminal.painter import MakeView
@@ -37,6 +38,8 @@ class RunView:
         self._name = name
         self._news: deque[str] = deque(maxlen=NEWS_KEPT)
         self._track = array("d")
+        self._pose: Pose | None = None
+        """Where it was last known to be."""
         self._origin: object = None
         self._began_s: float | None = None
         self._arrivals = Arrivals()
@@ -54,7 +57,9 @@ class RunView:
         if self._companion.origin != self._origin:
             self._origin = self._companion.origin
             del self._track[:]  # counted from elsewhere
-        pose = status.pose
+            self._pose = None
+        pose = status.pose if knows_place(self._companion.vehicle) else None
+        self._pose = pose or self._pose
         if pose is not None and self._origin is not None:
             here = (pose.north_m, pose.east_m)
             if not self._track or math.dist(self._track[-2:], here) >= TRACK_STEP_M:
@@ -67,7 +72,7 @@ class RunView:
 
     def view(self, status: Status) -> MakeView:
         """What makes the view of this moment, in any thread."""
-        companion, pose = self._companion, status.pose
+        companion, pose = self._companion, self._pose
         executor, track = companion.executor, np.array(self._track).reshape(-1, 2)
         rover = None if pose is None or executor is None else Disc(pose.north_m, pose.east_m, 0.0)
         heading_rad = 0.0 if pose is None else pose.heading_rad
@@ -89,7 +94,7 @@ class RunView:
         return make
 
     def _rover_section(self, status: Status) -> Section:
-        companion, pose = self._companion, status.pose
+        companion, pose = self._companion, self._pose
         vehicle, mode = companion.vehicle, mode_of(companion.vehicle, companion.mission_run)
         armed = "armed" if mode["armed"] else "disarmed"
         facts = [
@@ -100,7 +105,8 @@ class RunView:
         if pose is not None:
             word, degrees = compass_word(pose.heading_rad), math.degrees(pose.heading_rad) % 360.0
             facts.append(Fact("heading", f"{degrees:.0f}° {word}", minor=True))
-            facts.append(Fact("position", f"N {pose.north_m:.1f}, E {pose.east_m:.1f} m", minor=True))
+            known = "" if knows_place(vehicle) else ", last known"
+            facts.append(Fact("position", f"N {pose.north_m:.1f}, E {pose.east_m:.1f} m{known}", minor=True))
         if vehicle.battery is not None and vehicle.battery.volts is not None:
             percent = "" if vehicle.battery.percent is None else f", {vehicle.battery.percent} %"
             facts.append(Fact("battery", f"{vehicle.battery.volts:.1f} V{percent}"))
