@@ -28,6 +28,9 @@ from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
 from companion.settings import Settings, SettingsError
 from companion.storage.shipped import SOURCE, shipped
 
+NO_SIZES = "''"
+"""How a shell is told an empty word."""
+
 
 class BenchError(ValueError):
     """An option that cannot be used; the text is one line."""
@@ -64,6 +67,8 @@ def bench(
         settings = usable_settings(settings_file)
         writable(json_file)
         writable(docs and docs / "benchmarks.md")
+        if not map_files and (start or target):
+            raise BenchError("--start, --target: on which map? Name a MAP, as in bench yard.png --start 0,24 ...")
         cases = _cases(map_files or [], sizes, maps, lambda file: _of_map(file, problems, start, target))
         contestants = _contestants(planners, settings, console, peers=peers)
         limits = Limits(seeds, seed, cell_s)
@@ -86,10 +91,7 @@ def bench(
     for table in _tables(entries, contestants, cases):
         console.print(table)
     console.print("\n" + " ".join(runs_explained(limits)).replace("*", "").replace("`", ""), highlight=False)
-    names = "".join(f"{file.name} " for file in map_files or [])
-    command = (
-        f"rover-companion bench {names}--sizes {sizes} --seeds {seeds} --seed {seed} --cell-s {cell_s:g} --docs docs"
-    )
+    command = _command(map_files or [], start, target, sizes, limits)
     try:
         if json_file is not None:
             with replaced(json_file) as new:
@@ -129,6 +131,14 @@ def _cases(files: list[Path], sizes: str, maps: Path | None, of_map: Callable[[P
     if not cases:
         raise BenchError("nothing to measure: give --sizes or a MAP")
     return cases
+
+
+def _command(files: list[Path], start: str | None, target: str | None, sizes: str, limits: Limits) -> str:
+    """How to measure the same again."""
+    maps = "".join(f"{file.name} " for file in files)
+    ends = f"--start {start} --target {target} " if start else ""
+    drawn = f"--seeds {limits.seeds} --seed {limits.first_seed} --cell-s {limits.cell_s:g}"
+    return f"rover-companion bench {maps}{ends}--sizes {sizes or NO_SIZES} {drawn} --docs docs"
 
 
 def _contestants(planners: str, settings: Settings, console: Console, *, peers: bool) -> list[Contestant]:

@@ -40,6 +40,7 @@ WRONG_SHOWN = 10
 FOR_EVER_S = 1e9
 GROUND_M = 1.0
 """Width of the ground along the lines that the autopilot drives by itself."""
+JUMPS = (mav.DO_JUMP, mav.JUMP_TAG, mav.DO_JUMP_TAG)
 ABOVE_HOME = 3
 """The frame in which a place without a usable one is sent."""
 
@@ -141,10 +142,11 @@ def _walk_items(items: Sequence[Item]) -> tuple[_Walk, Patrol | None]:
 
 def _walk_through(items: Sequence[Item], walk: _Walk, order: ItemWalk) -> None:
     """Raises ItemError when the walk cannot go on."""
-    steps = 0
+    steps, met = 0, set()
     while not order.over:
         item = items[order.here]
         steps += 1
+        met.add(order.here)
         if steps > MAX_ITEMS or len(walk.targets) > MAX_TARGETS:
             raise ItemError(f"{item.label}: jumps make this mission longer than {MAX_TARGETS} targets")
         if item.command in (mav.DO_JUMP, mav.DO_JUMP_TAG):
@@ -160,6 +162,9 @@ def _walk_through(items: Sequence[Item], walk: _Walk, order: ItemWalk) -> None:
         order.here += 1
     for number, (to, times) in order.jumped.items():
         walk.note(f"item {number}: {mav.command_name(mav.DO_JUMP)}: to item {to}, {times} times, written out")
+    for position, item in enumerate(items):
+        if position not in met and item.command not in JUMPS:
+            walk.note(f"{item.label}: never comes, a jump leads past it")
 
 
 def _take(item: Item, walk: _Walk) -> None:

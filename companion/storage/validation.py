@@ -56,6 +56,9 @@ def _described(error: ValidationError, model: type[BaseModel]) -> str:
         return f"{place}: one table where several may stand; write [[{name}]] with double brackets"
     if fault["type"] in WANTED:
         return f"{place}: input should be {WANTED[fault['type']]} (got {fault.get('input')!r:.60})"
+    if fault["type"] == "too_long" and fault["ctx"]["field_type"] == "Tuple":  # [18,0, 3]: its comma is a new value
+        wanted, given = fault["ctx"]["max_length"], fault.get("input")
+        return f"{place}: {wanted} values are wanted (got {given!r:.60}); decimals have a point, 18.0 and not 18,0"
     if fault["type"] != "extra_forbidden":
         return f"{place}: {reason.lower()} (got {fault.get('input')!r:.60})"
     known = _known_keys(model, fault["loc"][:-1])

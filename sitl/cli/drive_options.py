@@ -44,7 +44,8 @@ Start = Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: th
 Target = Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to reach.")]
 TopLeft = Annotated[bool, typer.Option("--top-left", help="With --world: Y counts down from the top row.")]
 ResolutionM = Annotated[
-    float | None, typer.Option(help="Field size of --world, if the map has none; without, as for `run`.")
+    float | None,
+    typer.Option(min=0.01, max=1000.0, help="Field size of --world, if the map has none; without, as for `run`."),
 ]
 Prior = Annotated[bool, typer.Option("--prior", help="With --world: the companion knows the map from the start.")]
 Params = Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")]

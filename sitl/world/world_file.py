@@ -238,9 +238,12 @@ class _Drawing:
         height, width = self.obstacles.shape
         size_m = (width * self.resolution_m, height * self.resolution_m)
         if not shape.intersects(shapely.box(0.0, 0.0, *size_m)):
+            # size_m is east first, as pictures are, places are north first, as in missions.
+            swapped = shape.intersects(shapely.box(0.0, 0.0, *size_m[::-1]))
+            remedy = "places are [north, east], are they the other way round?" if swapped else "move it inside"
             raise MapError(
                 f"{self.path}: {kind} {number}: lies outside the world, "
-                f"{size_m[0]:g} m east and {size_m[1]:g} m north; move it inside"
+                f"{size_m[0]:g} m east and {size_m[1]:g} m north; {remedy}"
             )
         return shape
 

@@ -43,6 +43,7 @@ def test_the_command_writes_table_json_and_page(tmp_path):
         (["--sizes", ""], "nothing to measure"),
         (["--sizes", "1", "--planners", "dijkstar"], "'dijkstra'"),
         (["--sizes", "1", "none.map"], "none.map"),
+        (["--sizes", "1", "--start", "0,24", "--target", "98,24"], "on which map?"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(arguments, words):

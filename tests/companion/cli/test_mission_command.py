@@ -189,12 +189,22 @@ def test_what_drive_would_refuse_is_refused_here_too(tmp_path: Path) -> None:
         ),
         ("[[target]]\nnorth_m = 18,0\neast_m = 1\n", "write 18.0 with a point, not with a comma"),
         (
+            "[[target]]\nfield = [18,0, 3]\n[grid]\nsize = [100, 50]\nhome = [0, 24]\n",
+            "target 1.field: 2 values are wanted (got [18, 0, 3]); decimals have a point, 18.0 and not 18,0",
+        ),
+        (
             '[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.toml"\nstart = [200, 10]\n',
             "lies outside the world",
         ),
         ('[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.png"\nstart = [30, 3]\n', "lies outside the world"),
     ],
-    ids=["a world file", "a decimal comma", "a start outside a world file", "a start outside a picture"],
+    ids=[
+        "a world file",
+        "a decimal comma",
+        "a decimal comma in a list",
+        "a start outside a world file",
+        "a start outside a picture",
+    ],
 )
 def test_mistakes_that_people_make_are_named(tmp_path: Path, text: str, says: str) -> None:
     (tmp_path / "w.toml").write_text("size_m = [40, 20]\n")
@@ -205,5 +215,7 @@ def test_mistakes_that_people_make_are_named(tmp_path: Path, text: str, says: st
     assert (result.exit_code, result.output.count("\n")) == (2, 1), result.output
     assert says in result.output and result.output.startswith(str(path))
     inside = path.with_name("inside.toml")
-    inside.write_text(text.replace("200", "20").replace("30, 3", "29, 3").replace("18,0", "18.0"))
+    inside.write_text(
+        text.replace("200", "20").replace("30, 3", "29, 3").replace("18,0, 3", "18, 3").replace("18,0", "18.0")
+    )
     assert CliRunner().invoke(app, ["mission", "check", str(inside)]).exit_code == (2 if "size_m" in text else 0)

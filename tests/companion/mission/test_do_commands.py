@@ -245,3 +245,11 @@ def test_every_command_that_is_taken_has_a_name_and_only_those_may_be_given() ->
 )
 def test_what_switches_over_must_not_arrive_twice(command: int, params: tuple[float, ...], repeatable: bool) -> None:
     assert DoCommand(command, (*params, *(None,) * (7 - len(params)))).repeatable is repeatable
+
+
+def test_what_a_jump_leads_past_is_named(tmp_path: Path) -> None:
+    rows = (waypoint(1), waypoint(2), do(3, 177, 1, -1), waypoint(4), do(5, 22))
+    mission = load_mission(wpl(tmp_path, HOME, *rows))
+    assert names(mission) == ["waypoint 1", "waypoint 2"]
+    assert "item 4: NAV_WAYPOINT (16): never comes, a jump leads past it" in mission.notes
+    assert "item 5: NAV_TAKEOFF (22): never comes, a jump leads past it" in mission.notes

@@ -318,3 +318,15 @@ def test_whatever_numbers_stand_in_it_a_world_is_understood_or_refused(
     else:
         assert world.ground.min() > 0.0 and world.ground.max() <= 1.0
         assert ray_m(world, 0.1, 0.1, 0.5, 5.0, 3.0) >= 0.0
+
+
+def test_a_shape_with_east_before_north_is_told_as_that(tmp_path):
+    path = tmp_path / "world.toml"
+    wall = "size_m = [40, 20]\n[[obstacle]]\nwidth_m = 0.5\nline_m = "
+    for line, remedy in (
+        ("[[25, 5], [34, 5]]", r"\[north, east\], are they"),
+        ("[[45, 50], [46, 50]]", "move it inside"),
+    ):
+        path.write_text(f"{wall}{line}\n")
+        with pytest.raises(MapError, match=remedy):
+            load_world(path)
