@@ -65,7 +65,7 @@ results: $(TOOLS)
 	$(BIN)/rover-sitl experiment driving --runs 30 --docs docs
 	$(BIN)/rover-sitl experiment traffic --docs docs
 	$(BIN)/rover-sitl experiment dead-companion --runs 6 --docs docs
-	$(BIN)/rover-companion bench $(wildcard $(GAME_MAPS)) --cell-s 0.8 --docs docs
+	$(BIN)/rover-companion bench $(wildcard $(GAME_MAPS)) --sizes 1,4,16,40 --cell-s 0.8 --docs docs
 	$(BIN)/rover-sitl experiment killed-companion --runs 10 --docs docs
 
 soak: $(KERNELS)

@@ -22,14 +22,17 @@ from companion.bench.peers import installed_peers
 from companion.bench.report import as_json, head, rows, runs_explained
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, replaced, usable_settings, writable, written
 from companion.cli.plan import PlaceError, place_of
+from companion.core.clock import stopwatch_s
 from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
 from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
 from companion.settings import Settings, SettingsError
 from companion.storage.shipped import SOURCE, shipped
 
+SIZES = "1,4,16,40"
 NO_SIZES = "''"
 """How a shell is told an empty word."""
+SAYS_S = 10.0
 
 
 class BenchError(ValueError):
@@ -42,8 +45,9 @@ def bench(
         typer.Argument(metavar="[MAP]...", help="Maps, with MovingAI scenario files beside them or --start, --target."),
     ] = None,
     sizes: Annotated[
-        str, typer.Option(help="Sizes of the four shipped maps, times 100 x 50, commas between; '': none.")
-    ] = "1,4,16,40",
+        str | None,
+        typer.Option(help="Sizes of the four shipped maps, times 100 x 50; default: 1,4,16,40; with MAPs none."),
+    ] = None,
     planners: Annotated[str, typer.Option(help="Names, commas between them; default: all of ours.")] = "",
     peers: Annotated[bool, typer.Option(help="Other libraries too, those that are installed.")] = True,
     seeds: Annotated[int, typer.Option(min=1, help="Searches on each map of planners that draw random numbers.")] = 100,
@@ -57,12 +61,13 @@ def bench(
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[Path | None, typer.Option(help="Folder whose benchmarks.md and images/ are written.")] = None,
 ) -> None:
-    """Compare planners on the four shipped maps, grown to several sizes, and on MAPs. Exit code 2: bad input.
+    """Compare planners on the four shipped maps, grown to several sizes, or on MAPs. Exit code 2: bad input.
 
     A row is made of --seeds searches if the planner draws random numbers, of 20 if not (its path is always the same),
     and of fewer where --cell-s is over; its column 'found' says how many searches gave a path, of how many.
     """
     console = Console()
+    sizes = ("" if map_files else SIZES) if sizes is None else sizes
     try:
         settings = usable_settings(settings_file)
         writable(json_file)
@@ -157,11 +162,17 @@ def _contestants(planners: str, settings: Settings, console: Console, *, peers: 
 
 def _with_progress(contestants: list[Contestant], cases: list[Case], limits: Limits, console: Console) -> list[Entry]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    told_s = stopwatch_s()
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("", total=None)
 
         def advance(what: str, done: int, total: int) -> None:
+            nonlocal told_s
             progress.update(task, description=what, completed=done, total=total)
+            # Nobody sees a bar in a file or a pipe.
+            if not console.is_terminal and done < total and stopwatch_s() - told_s >= SAYS_S:
+                told_s = stopwatch_s()
+                typer.echo(f"{done} of {total} measured, now {what} ...", err=True)
 
         return measure(contestants, cases, limits, advance)
 

@@ -55,7 +55,7 @@ def test_bad_input_is_one_line_and_exit_code_2(arguments, words):
 def test_two_ends_do_where_there_is_no_scenario_file(tmp_path):
     (tmp_path / "small.map").write_text("type octile\nheight 3\nwidth 5\nmap\n.....\n..@..\n.....\n")
     figures = tmp_path / "b.json"
-    command = ["bench", str(tmp_path / "small.map"), "--sizes", "", "--planners", "astar", "--no-peers"]
+    command = ["bench", str(tmp_path / "small.map"), "--planners", "astar", "--no-peers"]
     result = CliRunner().invoke(app, [*command, "--start", "0,1", "--target", "4,1", "--json", str(figures)])
     assert result.exit_code == 0, result.output
     (entry,) = json.loads(figures.read_text())["entries"]
