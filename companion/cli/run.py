@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -66,6 +67,8 @@ BAD_INPUT = (
 )
 UNHURRIED_S = 10.0
 """A run that ends by itself waits this long for a slow disk, and for who reads its output."""
+AGAIN_S = 1.0
+"""So long after a signal the program must have ended, or the signal is raised again."""
 EXIT_REACHED, EXIT_MISSED, EXIT_STOPPED = 0, 3, 130
 
 
@@ -352,12 +355,25 @@ def _save_map(companion: Companion, directory: Path, budget: ShutdownBudget) -> 
 class _StopSignals:
     """SIGINT, SIGTERM and a closed terminal stop the rover, then end the run.
 
-    Before the drive they end the program at once.
+    Before the drive they end the program at once. An exception that is raised within a compiler's callback is lost, so
+    it is raised again until the program ends, and a drive does not begin.
     """
 
     def __init__(self) -> None:
         self.asked = False
-        self.listener: Stoppable | None = None
+        self._listener: Stoppable | None = None
+        self._again: threading.Timer | None = None
+
+    @property
+    def listener(self) -> Stoppable | None:
+        """Who is told; None before the drive."""
+        return self._listener
+
+    @listener.setter
+    def listener(self, listener: Stoppable | None) -> None:
+        if self.asked and self._listener is None:
+            raise SystemExit(EXIT_STOPPED)
+        self._listener = listener
 
     def __enter__(self) -> _StopSignals:
         """Install the handlers."""
@@ -366,12 +382,20 @@ class _StopSignals:
 
     def __exit__(self, *_: object) -> None:
         """Restore the former handlers."""
+        if self._again is not None:
+            self._again.cancel()
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
     def _stop(self, number: int, frame: FrameType | None) -> None:
-        self.asked = True
-        if self.listener is None:
+        if self._listener is not None:
+            self.asked = True
+            self._listener.stop()
+            return
+        if not self.asked:
             typer.echo("stopped before anything was sent to the rover", err=True)
-            raise SystemExit(EXIT_STOPPED)
-        self.listener.stop()
+        self.asked = True
+        self._again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
+        self._again.daemon = True
+        self._again.start()
+        raise SystemExit(EXIT_STOPPED)
