@@ -35,6 +35,8 @@ FIRST_WAIT_S, LONGEST_WAIT_S = 0.5, 10.0
 """Before a web process that has ended is started again."""
 HANGS_S = 10.0
 """A process that takes nothing for so long is ended."""
+PIPE_BYTES = 16 * 1024
+"""What waits in a pipe is seconds of moments before anybody notices that nothing is taken: not the usual 64 kB."""
 CLOSE_S = 1.5
 MOST_ACTIONS = 50
 NICE = 5
@@ -196,7 +198,7 @@ class WebProcess:
         command = [sys.executable, "-m", "companion.viewer.server", str(descriptor)]
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, pass_fds=(descriptor,),
-            start_new_session=True,
+            start_new_session=True, pipesize=PIPE_BYTES,
         )  # fmt: skip
         _yield(process.pid)
         self._process, self.started = process, self.started + 1

@@ -368,6 +368,12 @@ def test_a_report_is_walked_through_by_clicks(report_file: Path) -> None:
         current = "return document.querySelector('.decision-list [aria-current=true]')?.innerText"
         report.until(lambda: report.run(current) == told)
         assert told.split(maxsplit=1)[0] in report.text and not time_of().startswith("0:00")
+        place = "return document.querySelector('.decision-list').scrollTop"
+        report.run(SEEK, 1.0)
+        report.until(lambda: int(report.run(place)) > 0)
+        report.run(SEEK, 0.0)
+        report.shows("No decision yet.")
+        report.until(lambda: int(report.run(place)) == 0, 10.0)  # the first ones are to be seen
         report.press("Now")
         at_row = time_of()
         report.click_at("canvas.marks", 200, 5)

@@ -99,7 +99,7 @@ export class Decisions {
       setAttribute(row, "aria-current", from + i === this.current ? "true" : null),
     );
     const row = this.rows[this.current - from];
-    if (row) this.list.scrollTop = row.offsetTop - this.list.offsetTop - this.list.clientHeight / 2;
+    this.list.scrollTop = row ? row.offsetTop - this.list.offsetTop - this.list.clientHeight / 2 : 0;
   }
 
   /** What is not in the list, as a button that goes there. */

@@ -207,8 +207,10 @@ def test_a_process_that_hangs_is_ended_and_begun_anew(web: WebProcess, monkeypat
     assert first is not None
     os.kill(first, signal.SIGSTOP)
     monkeypatch.setattr(web_process, "HANGS_S", 0.1)
-    big = json.dumps({**frame(1.0), "path": [[0.0, 0.0]] * 20_000}).encode()
-    wait_until(lambda: web.put(wire.JSON, big) and web.started == 2)
+    moment = json.dumps({**frame(1.0), "path": [[0.0, 0.0]] * 100}).encode()
+    for _ in range(8 * 5):  # of 8 seconds
+        wait_until(lambda: web.put(wire.JSON, moment))
+    wait_until(lambda: web.started == 2)
     monkeypatch.undo()
     begin(web)
     with looking(web) as client:
