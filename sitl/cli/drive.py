@@ -147,13 +147,13 @@ def drive(
 
 
 def _written(wanted: Outputs, run: Drive, recorder: Recorder | NullRecorder, console: Console) -> int:
-    """What was asked for is written; the exit code if something could not be."""
+    """What was asked for is written; the exit code if something could not be, or the record has ended early."""
     try:
         wanted.write(run, recorder, console)
     except OutputError as error:
         _warn(str(error))
         return EXIT_NOT_WRITTEN
-    return 0
+    return EXIT_NOT_WRITTEN if recorder.problem else 0
 
 
 def _simulated_lidar(text: str) -> LidarSpec:

@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 from companion.recording.recorder import unused
 from sitl.cli.commands import app
 from tests.support.full_disk import full_after
-from tests.support.quick import first_of
 from tests.support.reports import report_data_in
 
 YARD = "[grid]\nsize = [20, 20]\nhome = [3, 3]\n[sitl]\nsensors = 'lidar-360'\n[[target]]\nfield = [6, 3]\n"
@@ -55,7 +54,15 @@ def test_a_disk_that_gets_full_leaves_the_old_files_and_nothing_cut(mission: Pat
     assert image.read_text() == figures.read_text() == "old"
 
 
-@first_of(1, "command", [["drive", "--json"], ["physics", "--port", "1", "--write-params"]])
+def test_a_record_that_ends_early_is_told_by_the_exit_code(mission: Path, tmp_path: Path) -> None:
+    record = tmp_path / "record"
+    with full_after(20_000):
+        result = CliRunner().invoke(app, ["drive", str(mission), "--record", str(record)])
+    assert result.exit_code == 5 and f"{record}: the record has ended: File too large" in result.output
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("command", [["drive", "--json"], ["physics", "--port", "1", "--write-params"]])
 def test_a_full_disk_is_one_line(mission: Path, command: list[str]) -> None:
     result = CliRunner().invoke(app, [*command, "/dev/full", str(mission)])
     assert (result.exit_code, result.stderr) == (5 if command[0] == "drive" else 2, f"/dev/full: {FULL}\n")
