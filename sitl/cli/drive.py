@@ -86,7 +86,8 @@ def drive(
 
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
     4: collision; 2: bad input; 5: as 0, but a file could not be written; 130: stopped by Ctrl-C or
-    SIGTERM. A run that waits for a person ends after a minute, one that cannot begin after five.
+    SIGTERM. A run that waits for a person ends after a minute, with --web-actions never; one that
+    cannot begin ends after five.
     """
     painter: Painter | None = None
     console, wanted = Console(), outputs(image, map_stem, json_file, report_file, record)
