@@ -7,7 +7,8 @@ import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Annotated
 
@@ -137,15 +138,16 @@ def done_one_by_one(
 ) -> Iterator[Job]:
     """Run all jobs, in a process for each processor; yields each when it is done. ``Chosen`` follows all others.
 
-    Raises BrokenProcessPool when the system has ended one of the processes.
+    Raises BrokenProcessPool when the system has ended one of the processes. Whoever asks for no more ends them.
     """
     waiting, done = list(jobs), set[Job]()
     running: dict[Future[None], Job] = {}
-    with ProcessPoolExecutor(processes or os.cpu_count(), get_context("spawn"), _end_quietly) as pool:
+    with ProcessPoolExecutor(processes or os.cpu_count(), get_context("spawn")) as pool, _ended_with_us():
         while waiting or running:
             for job in [job for job in waiting if done.issuperset(_before(job, jobs, after))]:
                 waiting.remove(job)
-                running[pool.submit(job)] = job
+                with _ctrl_c_waits():  # this starts a process if none is idle
+                    running[pool.submit(job)] = job
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 future.result()
                 job = running.pop(future)
@@ -165,9 +167,27 @@ def name_of(job: Job) -> str:
     return job.__name__.replace("_", " ")
 
 
-def _end_quietly() -> None:
-    """Ctrl-C ends a process of the compiler without a traceback of its own."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+@contextmanager
+def _ctrl_c_waits() -> Iterator[None]:
+    """Ctrl-C comes after this block. A process started in it never hears it, not even while it imports: it would
+    say so with a traceback of its own."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _ended_with_us() -> Iterator[None]:
+    """End the processes started in this block if it is left early: the pool would wait until their jobs are done."""
+    others = set(active_children())
+    try:
+        yield
+    except BaseException:
+        for process in set(active_children()) - others:
+            process.terminate()
+        raise
 
 
 def _before(job: Job, jobs: Sequence[Job], after: Mapping[Job, Sequence[Job]]) -> Sequence[Job]:

@@ -80,6 +80,8 @@ def _write(place: Path, wanted: Sequence[WantedParameter], table: Sequence[Wante
     form = SUFFIXES.get(place.suffix.lower())
     if form is None:
         raise OutputError(f"{place}: end its name in .param (Mission Planner, MAVProxy) or .params (QGroundControl)")
+    if not place.parent.is_dir():
+        raise OutputError(f"{place}: there is no folder {place.parent}; make it, or name another one")
     writable(place)
     with replaced(place) as new:
         new.write_text(text_of(wanted, table, form), encoding="utf-8")

@@ -320,6 +320,8 @@ def _ended(companion: Companion, rig: _Rig) -> int:
             if rig.recorder.problem:
                 typer.echo(rig.recorder.problem, err=True)
             typer.echo(f"record: {rig.place}; rover-companion report {rig.place} shows it")
+        if rig.stop.asked and code != EXIT_REACHED and rig.keeping.way_on:
+            typer.echo(rig.keeping.way_on)
     return code
 
 

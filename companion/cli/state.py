@@ -10,7 +10,7 @@ from companion.checkpoint.checkpointer import Checkpointer
 from companion.checkpoint.resume import PreviousRun
 from companion.checkpoint.state_directory import StateDirectory, StateDirectoryError, default_directory
 from companion.checkpoint.state_writer import StateFile, ThreadStateWriter
-from companion.cli.inputs import OutputError, writable
+from companion.cli.inputs import OutputError, writable, written
 from companion.executive.mission_progress import TargetStatus
 from companion.mavlink.signing import Signer, load_key
 from companion.mavlink.signing_time import TimeFile
@@ -36,6 +36,9 @@ class StateFiles:
         self._base = Settings()
         if named is not None and os.path.isfile(named):
             raise OutputError(f"{named}: is a file; --state takes a directory")
+        if named is not None and not named.is_dir():
+            with written(named):
+                named.mkdir(mode=0o700, parents=True)
         if named is not None:
             writable(named / TUNED)
 
@@ -101,6 +104,13 @@ class RunState:
             return ""
         stale = f", and do not --resume: {self.file.name} is older than this run" if self.file.exists() else ""
         return f"{self.checkpointer.problem}; make room there or name another place with --state DIR{stale}"
+
+    @property
+    def way_on(self) -> str:
+        """How to go on with a run that was stopped; empty if its state is not kept."""
+        if self.checkpointer is None or self.checkpointer.problem:
+            return ""
+        return "to go on where it was stopped: the same command with --resume"
 
     @property
     def statuses(self) -> list[tuple[str, TargetStatus]]:

@@ -19,20 +19,29 @@ def doubtful_places(mission: Mission, home: GeoPoint | None = None) -> list[str]
 
     ``home``: the autopilot's; None: the file's own. Without one, targets in degrees count from the first of them.
     """
+    return [line for _, line in _doubts(mission, home)]
+
+
+def most_doubtful(mission: Mission, home: GeoPoint) -> str:
+    """The line of the target that is farthest from home; empty if none is far."""
+    return max(_doubts(mission, home), default=(0.0, ""))[1]
+
+
+def _doubts(mission: Mission, home: GeoPoint | None) -> list[tuple[float, str]]:
     places = [target.place for target in mission.targets]
     first = next((place for place in places if isinstance(place, GeoPoint)), None)
     own = mission.planned_home or (mission.sitl.home if mission.sitl is not None else None)
     zero, name = (home or own, "home") if home or own else (first, "the first target in degrees")
-    lines = []
+    doubts = []
     for number, target in enumerate(mission.targets, start=1):
         what, place = f"target {number} '{target.name}'", target.place
         if isinstance(place, HomePoint):
             far_m = math.hypot(place.north_m, place.east_m)
             if far_m > FAR_M:
-                lines.append(f"{what} is {distance_text(far_m)} from home; is that meant?")
+                doubts.append((far_m, f"{what} is {distance_text(far_m)} from home; is that meant?"))
         elif isinstance(place, GeoPoint) and zero is not None and (line := _doubt(place, zero, name)):
-            lines.append(f"{what} {line}")
-    return lines
+            doubts.append((great_circle_m(place, zero), f"{what} {line}"))
+    return doubts
 
 
 def _doubt(place: GeoPoint, zero: GeoPoint, name: str) -> str:

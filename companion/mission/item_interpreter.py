@@ -148,7 +148,7 @@ def _walk_through(items: Sequence[Item], walk: _Walk, order: ItemWalk) -> None:
         steps += 1
         met.add(order.here)
         if steps > MAX_ITEMS or len(walk.targets) > MAX_TARGETS:
-            raise ItemError(f"{item.label}: jumps make this mission longer than {MAX_TARGETS} targets")
+            raise ItemError(_too_long(items, item, order, in_auto=walk.in_auto))
         if item.command in (mav.DO_JUMP, mav.DO_JUMP_TAG):
             if walk.in_auto and item.param(2) == -1.0:
                 raise ItemError(f"{item.label}: repeats for ever; in AUTO a mission needs an end")
@@ -165,6 +165,16 @@ def _walk_through(items: Sequence[Item], walk: _Walk, order: ItemWalk) -> None:
     for position, item in enumerate(items):
         if position not in met and item.command not in JUMPS:
             walk.note(f"{item.label}: never comes, a jump leads past it")
+
+
+def _too_long(items: Sequence[Item], item: Item, order: ItemWalk, *, in_auto: bool) -> str:
+    """Of the jumps met before this item, the one with the most repeats is to blame."""
+    if not order.jumped:
+        return f"{item.label}: this mission is longer than {MAX_TARGETS} targets; split it"
+    number = max(order.jumped, key=lambda jump: order.jumped[jump][1])
+    jump = next(one for one in items if one.index == number)
+    remedy = "give it fewer repeats" if in_auto else "give it fewer repeats, or -1 for a patrol without end"
+    return f"{jump.label}: its jumps make this mission longer than {MAX_TARGETS} targets; {remedy}"
 
 
 def _take(item: Item, walk: _Walk) -> None:
@@ -192,7 +202,7 @@ def _travel(item: Item, walk: _Walk) -> None:
     place = _place(item, walk)
     hold_s = item.param(1) if item.command in (mav.NAV_WAYPOINT, mav.NAV_LOITER_TIME) else 0.0
     if not (math.isfinite(hold_s) and hold_s >= 0.0):
-        raise ItemError(f"{item.label}: a hold of {hold_s} s")
+        raise ItemError(f"{item.label}: a hold of {hold_s} s; it must not be negative")
     _add(Target(_name(item, walk), place, hold_s=hold_s, speed_m_s=walk.speed_m_s), walk)
     _note_unused(item, walk)
 

@@ -82,6 +82,8 @@ class ItemWalk:
             if to not in self._tags:
                 raise ItemError(f"{item.label}: there is no tag {to:g} to jump to")
             return self._tags[to]
-        if not math.isfinite(to) or to != int(to) or int(to) not in self._places or int(to) == item.index:
+        if to == item.index:
+            raise ItemError(f"{item.label}: jumps to itself; name the item that it should go back to")
+        if not math.isfinite(to) or to != int(to) or int(to) not in self._places:
             raise ItemError(f"{item.label}: there is no item {to:g} to jump to")
         return self._places[int(to)]

@@ -67,12 +67,25 @@ def _read(path: Path) -> Json:
     try:
         plan = json.loads(text)
     except json.JSONDecodeError as error:
-        raise MissionError(f"{path}: line {error.lineno}: not valid JSON: {error.msg.lower()}") from error
+        reason = _what_else(text, error.pos) or f"not valid JSON: {error.msg.lower()}"
+        raise MissionError(f"{path}: line {error.lineno}: {reason}") from error
     except (RecursionError, ValueError) as error:
         raise MissionError(f"{path}: not valid JSON: {str(error)[:80]}") from error
     if not isinstance(plan, dict):
         raise MissionError(f"{path}: not a QGroundControl plan")
     return plan
+
+
+def _what_else(text: str, fault: int) -> str:
+    """What a text with a fault at this place is, if it is no plan with a slip of the pen; empty if it may be one."""
+    whole = text.strip()
+    if not whole:
+        return "the file is empty"
+    if whole.startswith("QGC WPL"):
+        return f"begins with {reprlib.repr(whole.splitlines()[0])}; end its name in .waypoints"
+    if whole.startswith("{") and (fault >= len(text.rstrip()) or not whole.endswith("}")):
+        return "not valid JSON: the end is missing; the file seems cut, save or copy it anew"
+    return ""
 
 
 # --- items -----------------------------------------------------------------------------------------------------------

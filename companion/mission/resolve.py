@@ -16,7 +16,7 @@ from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import Bound, Bounds, autopilot_bounds, mission_bounds
 from companion.mission.check import MAX_GRID_FIELDS
 from companion.mission.do_commands import DoCommand
-from companion.mission.doubtful_places import distance_text, doubtful_places
+from companion.mission.doubtful_places import distance_text, most_doubtful
 from companion.mission.field_size import FieldSize
 from companion.mission.mission import GridTooLargeError, Here, Mission, MissionError, OnBlocked
 from companion.mission.prior_map import stamp_prior
@@ -24,6 +24,8 @@ from companion.mission.prior_map import stamp_prior
 MIN_MARGIN_M = 25.0
 COARSEST_M = 5.0
 """With larger fields no rover finds its way round anything: to ask for them is no remedy."""
+UNLIKELY_M = 100_000.0
+"""A place farther from home than this is a slip in its coordinates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +181,7 @@ def _fixed_grid(mission: Mission, home: NedPoint) -> Grid | None:
     if spec.size is None or spec.home is None:
         return None
     width, height = spec.size
-    _refuse_large(width, height, spec.resolution_m, mission, [])
+    _refuse_large(width, height, spec.resolution_m, mission)
     return empty_grid(width, height, spec.resolution_m, _south_west(home, spec.home, spec.resolution_m))
 
 
@@ -210,23 +212,30 @@ def _enclosing_grid(
         math.ceil((edge - at + margin_m) / size_m) for at, edge in zip((home.east_m, home.north_m), high, strict=True)
     )
     width, height = west + east + 1, south + north + 1
-    _refuse_large(width, height, size_m, mission, doubtful_places(mission, places.frame.to_geo(home)))
+    far_m = max(math.hypot(east_m - home.east_m, north_m - home.north_m) for east_m, north_m in corners)
+    _refuse_large(width, height, size_m, mission, most_doubtful(mission, places.frame.to_geo(home)), far_m)
     return empty_grid(width, height, size_m, _south_west(home, Cell(west, south), size_m))
 
 
-def _refuse_large(width: int, height: int, resolution_m: float, mission: Mission, doubtful: list[str]) -> None:
-    """Raises MissionError for too many fields. ``doubtful``: what is to be said of places that may be wrong."""
+def _refuse_large(
+    width: int, height: int, resolution_m: float, mission: Mission, doubtful: str = "", far_m: float = 0.0
+) -> None:
+    """Raises MissionError for too many fields.
+
+    ``doubtful``: what is to be said of a place that may be wrong; ``far_m``: how far from home the farthest place is.
+    """
     if width * height > MAX_GRID_FIELDS:
         enough_m = math.ceil(10.0 * resolution_m * math.sqrt(width * height / MAX_GRID_FIELDS)) / 10.0
         of_ours = not mission.stored and (mission.source is None or mission.source.suffix.lower() == ".toml")
         coarser = f"{'resolution_m =' if of_ours else '--resolution-m'} {enough_m:g} or larger"
         remedy = f"use {coarser}, or a smaller margin_m" if of_ours else f"use {coarser}"
-        near = f"{doubtful[0]} If it is" if doubtful else "are all places near home? If they are"
+        near = f"{doubtful} If it is" if doubtful else "are all places near home? If they are"
         if enough_m > COARSEST_M:
             across = " x ".join(distance_text(fields * resolution_m) for fields in (width, height))
-            why = doubtful[0] if doubtful else "are all places, fences and margin_m meant so?"
+            why = doubtful or "are all places, fences and margin_m meant so?"
             says = f"{across} is more ground than a rover can keep a map of; {why}"
-            raise GridTooLargeError(f"grid: {says} If it is, drive it in parts")
+            remedy = "Check the coordinates" if far_m > UNLIKELY_M else "If it is, drive it in parts"
+            raise GridTooLargeError(f"grid: {says} {remedy}")
         raise GridTooLargeError(
             f"grid: {width} x {height} fields of {resolution_m:g} m are more than {MAX_GRID_FIELDS}; {near}, {remedy}"
         )

@@ -17,7 +17,7 @@ from pathlib import Path
 from companion.core.frames import GeoPoint
 from companion.mission import mav_commands as mav
 from companion.mission.item_interpreter import mission_from_items
-from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
+from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point, number_hint
 from companion.mission.mission import Mission, MissionError
 from companion.storage.files import read_text
 
@@ -31,7 +31,7 @@ def load(path: Path, *, skip_unknown: bool = False) -> Mission:
     if not lines or tuple(lines[0][1]) != HEADER:
         found = reprlib.repr(" ".join(lines[0][1])) if lines else "nothing"
         place = f"line {lines[0][0]}" if lines else "file"
-        raise MissionError(f"{path}: {place}: expected the header 'QGC WPL 110', found {found}")
+        raise MissionError(f"{path}: {place}: expected the header 'QGC WPL 110', found {found}{_hint(lines)}")
     if len(lines) - 1 > MAX_ITEMS:
         raise MissionError(f"{path}: {len(lines) - 1} items are more than {MAX_ITEMS}")
     items = []
@@ -56,6 +56,12 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
         (number, line.partition("#")[0].split()) for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1)
     )
     return [(number, words) for number, words in split if words]
+
+
+def _hint(lines: list[tuple[int, list[str]]]) -> str:
+    """What to add where another kind of file has this name."""
+    is_plan = bool(lines) and lines[0][1][0].startswith("{")
+    return "; it seems a plan of QGroundControl; end its name in .plan" if is_plan else ""
 
 
 def _item(words: list[str], position: int) -> Item:
@@ -96,5 +102,5 @@ def _real(word: str, name: str, *, nan: bool = False) -> float:
     except ValueError:
         value = math.inf
     if not (math.isfinite(value) or (nan and math.isnan(value))):
-        raise ValueError(f"{name}: expected a number, got {reprlib.repr(word)}")
+        raise ValueError(f"{name}: expected a number, got {reprlib.repr(word)}{number_hint(word)}")
     return value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from typing import get_args
 
@@ -60,12 +61,22 @@ def _described(error: ValidationError, model: type[BaseModel]) -> str:
         wanted, given = fault["ctx"]["max_length"], fault.get("input")
         return f"{place}: {wanted} values are wanted (got {given!r:.60}); decimals have a point, 18.0 and not 18,0"
     if fault["type"] != "extra_forbidden":
-        return f"{place}: {reason.lower()} (got {fault.get('input')!r:.60})"
+        return (
+            f"{place}: {reason.lower()} (got {fault.get('input')!r:.60}){_unquoted(fault['type'], fault.get('input'))}"
+        )
     known = _known_keys(model, fault["loc"][:-1])
     near = alike(str(fault["loc"][-1]), known)
     hint = f", did you mean '{near}'?" if near else f"; known here: {', '.join(known)}"
     sections = [] if len(fault["loc"]) > 1 else _sections_with(model, str(fault["loc"][0]))
     return f"{place}: unknown key{f'; it stands below [{sections[0]}]' if len(sections) == 1 else hint}"
+
+
+def _unquoted(kind: str, value: object) -> str:
+    """What to add where a number or a truth value stands in quotes; empty elsewhere."""
+    wanted = {"float_type": r"[+-]?[\d_]+([.,]\d+)?", "int_type": r"[+-]?\d+", "bool_type": "true|false"}.get(kind)
+    if wanted is None or not isinstance(value, str) or not re.fullmatch(wanted, value.strip()):
+        return ""
+    return f"; write {value.strip().replace(',', '.')} without quotes"
 
 
 def _sections_with(model: type[BaseModel], key: str) -> list[str]:

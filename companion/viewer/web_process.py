@@ -89,7 +89,11 @@ def web_place(text: str, token_file: Path | None) -> WebPlace:
         )
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
-        raise WebError(f"--web: {', '.join(missing)} is not installed; install rover-companion[web]")
+        names = f"{', '.join(missing)} {'are' if len(missing) > 1 else 'is'}"
+        raise WebError(
+            f"--web: {names} not installed; install rover-companion[web] "
+            "(in the project's folder: .venv/bin/pip install -e '.[web]')"
+        )
     return place
 
 

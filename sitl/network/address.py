@@ -40,6 +40,8 @@ def open_endpoint(url: str, simulator: Simulator, log: EventLog | None = None, s
         number = getattr(error, "errno", None)
         # pyserial repeats the path and the error number in its text.
         reason = os.strerror(number) if kind == "serial" and number else getattr(error, "strerror", None) or error
+        if kind == "pty" and number == errno.EEXIST and os.path.islink(place):
+            reason = f"{reason}, perhaps another rover-sitl has it"
         remedy = REMEDIES.get(kind, TAKEN if number == errno.EADDRINUSE else ELSEWHERE)
         raise ListenError(f"{url}: cannot be opened: {reason}; {remedy}") from error
 

@@ -57,6 +57,10 @@ def test_what_is_not_for_this_rover_is_a_comment(tmp_path: Path) -> None:
     ("words", "says"),
     [
         (["--write", "rover.txt"], "rover.txt: end its name in .param"),
+        (
+            ["--write", "nowhere/rover.param"],
+            "nowhere/rover.param: there is no folder nowhere; make it, or name another",
+        ),
         (["--check"], "name the rover with --connect"),
         (["--mission", "none.toml"], "none.toml"),
         (["--check", "--connect", "bluetooth:1"], "is not a link"),

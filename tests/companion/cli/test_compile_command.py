@@ -6,6 +6,7 @@ import contextlib
 import os
 import pty
 import signal
+import time
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -90,6 +91,16 @@ def test_settings_add_what_they_choose(monkeypatch: pytest.MonkeyPatch, tmp_path
     assert run("--settings", file).exit_code == 0
     assert asked[:4] == [genetic_planner, graph_searches, drive, manoeuvres]
     assert isinstance(asked[4], Chosen) and len(asked) == 5
+
+
+def test_ctrl_c_is_not_for_the_processes_that_compile() -> None:
+    """It is kept from them from their first moment on; the parent ends them, whatever they are at."""
+    interrupted, endless = partial(signal.raise_signal, signal.SIGINT), partial(time.sleep, 600.0)
+    jobs = done_one_by_one([interrupted, endless], {}, processes=2)
+    since_s = time.monotonic()
+    assert next(jobs) is interrupted
+    jobs.close()  # type: ignore[attr-defined]
+    assert time.monotonic() - since_s < 60.0 and signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 def test_jobs_wait_for_those_whose_kernels_they_use() -> None:

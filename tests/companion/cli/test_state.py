@@ -9,7 +9,8 @@ import pytest
 from companion.checkpoint.checkpointer import Checkpointer
 from companion.checkpoint.state_directory import StateDirectoryError
 from companion.checkpoint.state_format import SavedProgress
-from companion.cli.state import RunState
+from companion.cli.inputs import OutputError
+from companion.cli.state import RunState, StateFiles
 from tests.support.rig import yard
 from tests.support.states import a_state, leave_state
 
@@ -19,8 +20,9 @@ def test_a_state_that_is_older_than_the_run_is_told_with_the_remedy(
 ) -> None:
     with_state = RunState(yard(tmp_path), tmp_path / "state", resume=False, say=lambda _: None)
     with_state.start()
-    assert with_state.problem == ""
+    assert with_state.problem == "" and with_state.way_on.endswith("the same command with --resume")
     monkeypatch.setattr(Checkpointer, "problem", "mission.state: the state cannot be saved: No space left on device")
+    assert with_state.way_on == ""
     assert with_state.problem.endswith("; make room there or name another place with --state DIR")
     assert with_state.file is not None
     with_state.file.write_bytes(b"as it was")
@@ -66,3 +68,8 @@ def test_a_mission_that_has_ended_is_told_and_not_driven_again(tmp_path: Path) -
     assert keeping.ended and keeping.statuses == [("gate", "reached")]
     assert said == ["Yard was driven to its end: 1 of 1 targets reached", "to drive it again, start without --resume"]
     keeping.close()
+
+
+def test_a_folder_that_cannot_be_made_is_told_as_it_was_given() -> None:
+    with pytest.raises(OutputError, match=r"^/proc/none: cannot be written: .*; choose another place$"):
+        StateFiles(Path("/proc/none"))

@@ -118,6 +118,24 @@ def test_text_that_is_no_plan(tmp_path: Path, text: str) -> None:
     assert refusal(plan(tmp_path, text))
 
 
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("QGC WPL 110\n0\t1\t0\t16", "line 1: begins with 'QGC WPL 110'; end its name in .waypoints"),
+        (
+            '{"fileType": "Plan",\n"mission": {"items": [{}',
+            "line 2: not valid JSON: the end is missing; the file seems cut",
+        ),
+        ('{"fileType": "Plan",\n"mis', "the file seems cut"),
+        ('{"fileType": "Plan",\n"version": tr', "the file seems cut"),
+        ('{"fileType": "Plan",\n"version": 1,}', "line 2: not valid JSON: expecting property name"),
+        ("\n", "the file is empty"),
+    ],
+)
+def test_another_file_and_a_cut_one_are_told(tmp_path: Path, text: str, reason: str) -> None:
+    assert reason in refusal(plan(tmp_path, text))
+
+
 def test_fences_alone_can_be_taken_but_not_driven(tmp_path: Path) -> None:
     data = changed("mission.items", [])
     assert "fences but no place" in refusal(plan(tmp_path, data))

@@ -169,7 +169,9 @@ def test_a_target_outside_a_fixed_grid_is_refused() -> None:
 def test_a_mission_on_the_other_side_of_the_world_is_refused_with_a_remedy() -> None:
     text = refusal(mission(GeoPoint(-35.36, 149.16)))
     assert " km is more ground than a rover can keep a map of; target 1 't0' is 1" in text
-    assert text.endswith(" km from home; is that meant? If it is, drive it in parts") and "resolution_m" not in text
+    assert text.endswith(" km from home; is that meant? Check the coordinates") and "resolution_m" not in text
+    nearer = refusal(mission(HomePoint(2000.0, 0.0), HomePoint(0.0, 90_000.0)))
+    assert nearer.endswith("target 2 't1' is 90.0 km from home; is that meant? If it is, drive it in parts")
     assert "resolution_m = " in refusal(mission(HomePoint(1500.0, 1500.0)))
 
 

@@ -149,13 +149,15 @@ def test_fences_may_stand_after_the_items(tmp_path: Path) -> None:
         ([HOME, waypoint(1), do(2, 181, 1, 1), do(3, 177, 2, -1)], "item 3: DO_JUMP (177): repeats for ever without"),
         ([HOME, waypoint(1), do(2, 177, 7, 1)], "no item 7"),
         ([HOME, waypoint(1), do(2, 177, 0, 1)], "no item 0"),
-        ([HOME, waypoint(1), do(2, 177, 2, 1)], "no item 2"),
+        ([HOME, waypoint(1), do(2, 177, 2, 1)], "item 2: DO_JUMP (177): jumps to itself"),
         ([HOME, waypoint(1), do(2, 177, 1, 1.5)], "1.5 repeats"),
-        ([HOME, waypoint(1), do(2, 177, 1, 1e9)], "longer than"),
-        ([HOME, do(1, 178, 1, 1), do(2, 177, 1, 1e9)], "longer than"),
+        ([HOME, waypoint(1), do(2, 177, 1, 1e9)], "item 2: DO_JUMP (177): its jumps make this mission longer than"),
+        ([HOME, do(1, 178, 1, 1), do(2, 177, 1, 1e9)], "longer than 10000 targets; give it fewer repeats, or -1 for"),
+        ([HOME, waypoint(1), do(2, 177, 1, 3), do(3, 177, 1, 30000)], "item 3: DO_JUMP"),
+        ([HOME, *map(waypoint, range(1, 10003))], "this mission is longer than 10000 targets; split it"),
         ([HOME, do(1, 178, 1, 0), waypoint(2)], "speed of 0"),
         ([HOME, do(1, 178, 2, 3), waypoint(2)], "kind 2"),
-        ([HOME, waypoint(1, hold=-1)], "hold of -1"),
+        ([HOME, waypoint(1, hold=-1)], "hold of -1.0 s; it must not be negative"),
         ([HOME, waypoint(1, lat=91)], "91.0, 23.2 is not a latitude"),
         ([HOME, "1 0 1 16 0 0 0 0 5 5 0 1"], "frame 1 (LOCAL_NED)"),
         ([HOME, waypoint(1), do(2, 112, 5), do(3, 93, 5)], "item 3: NAV_DELAY (93): a delay after a condition"),
@@ -168,7 +170,10 @@ def test_fences_may_stand_after_the_items(tmp_path: Path) -> None:
         ([HOME, waypoint(1), do(2, 5004, 0, lat=1, lon=1)], "radius of 0"),
         ([HOME, waypoint(2)], "line 3: item 1 is expected"),
         ([HOME, "1 0 3 16 0 0 0 0 5 5 0"], "line 3: 12 values"),
-        ([HOME, "1 0 3 16 0 0 0 0 5,5 5 0 1"], "line 3: latitude"),
+        (
+            [HOME, "1 0 3 16 0 0 0 0 5,5 5 0 1"],
+            "line 3: latitude: expected a number, got '5,5'; write 5.5 with a point",
+        ),
         ([HOME, "1 0 3 16 inf 0 0 0 5 5 0 1"], "line 3: p1"),
         ([HOME, "1 0 3 1_6 0 0 0 0 5 5 0 1"], "line 3: command"),
         ([HOME, "1 0 3 16.5 0 0 0 0 5 5 0 1"], "line 3: command"),
@@ -189,6 +194,7 @@ def test_a_crossing_fence_is_refused(tmp_path: Path) -> None:
 
 def test_other_headers_and_suffixes_are_refused(tmp_path: Path) -> None:
     assert "line 1: expected the header" in refusal(wpl(tmp_path, HOME, header="QGC WPL 120"))
+    assert refusal(wpl(tmp_path, HOME, header='{"fileType": "Plan",')).endswith("QGroundControl; end its name in .plan")
     (tmp_path / "a.txt").write_bytes(b"\xff\xfe")
     assert "not UTF-8" in refusal(tmp_path / "a.txt")
     (tmp_path / "a.kml").write_text("")

@@ -81,6 +81,11 @@ def test_other_versions_are_named(copy: Path) -> None:
     assert "python 2.7" in note
 
 
+def a_file(folder: Path) -> None:
+    shutil.rmtree(folder)
+    folder.write_text("")
+
+
 REFUSED: dict[str, tuple[Change, list[str]]] = {
     "mission changed": (with_flipped_bit("inputs/mission/yard.toml", 3), ["yard.toml", "changed since the run"]),
     "mission.json changed": (with_flipped_bit("mission.json", 30), ["mission.json", "changed since the run"]),
@@ -103,6 +108,7 @@ REFUSED: dict[str, tuple[Change, list[str]]] = {
     "packets damaged": (with_flipped_bit("link.tlog", 5000), ["link.tlog", "damaged"]),
     "ticks damaged": (with_flipped_bit("rounds.bin", 500), ["rounds.bin", "damaged"]),
     "decisions damaged": (with_flipped_bit("decisions.jsonl", 500), ["decisions.jsonl", "damaged"]),
+    "a file": (a_file, ["copy: is no directory; give the directory of a record"]),
     "nothing there": (shutil.rmtree, ["meta.json", "cannot be read"]),
     "no packets": (removed("link.tlog"), ["link.tlog", "cannot be read"]),
     "ticks huge": (huge("rounds.bin"), ["rounds.bin", "larger than"]),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import pytest
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from companion.storage.toml_file import read_table, read_toml
 from companion.storage.validation import alike
@@ -14,7 +15,7 @@ from companion.storage.validation import alike
 class Wheel(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
-    radius_m: float
+    radius_m: Annotated[float, Field(strict=True)]
 
 
 class Cart(BaseModel):
@@ -57,7 +58,11 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     [
         ("[[wheel]]\nradius_m = 1.0\n[[wheel]]\n", "wheel 2.radius_m: field required, it is missing; see the manual"),
         ("[[wheel]]\nradius = 1.0", "wheel 1.radius_m: field required, it is missing"),
-        ("[[wheel]]\nradius_m = 'a'", "wheel 1.radius_m: input should be a valid number"),
+        ("[[wheel]]\nradius_m = 'a'", "wheel 1.radius_m: input should be a valid number (got 'a'); see"),
+        (
+            "[[wheel]]\nradius_m = '0,3'",
+            "wheel 1.radius_m: input should be a valid number (got '0,3'); write 0.3 without",
+        ),
         ("[wheel]\nradius_m = 1.0", "wheel: one table where several may stand; write [[wheel]] with double brackets"),
         ("\ufeffname = 1", "name: input should be a valid string"),
         ("nam = 'a'", "nam: unknown key, did you mean 'name'?; see the manual"),

@@ -194,7 +194,7 @@ REMEDIES: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "no key": (lambda folder: load_key(folder / "nokey"), "No such file or directory; name a file with the passphrase"),
     "settings in a folder": (load_settings, "Is a directory; name a TOML file, or leave --settings out"),
-    "a mission that says no resolution": (far, "km from home; is that meant? If it is, drive it in parts"),
+    "a mission that says no resolution": (far, "km from home; is that meant? Check the coordinates"),
 }
 
 

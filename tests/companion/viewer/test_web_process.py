@@ -286,10 +286,15 @@ def test_a_full_disk_leaves_no_token_that_is_cut(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("companion.viewer.web_process.find_spec", lambda name: None if name == "uvicorn" else object())
-    with pytest.raises(WebError, match=r"^--web: uvicorn is not installed; install rover-companion\[web\]$"):
+@pytest.mark.parametrize(
+    ("there", "says"), [("starlette websockets", "uvicorn is not"), ("websockets", "starlette, uvicorn are not")]
+)
+def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch, there: str, says: str) -> None:
+    monkeypatch.setattr("companion.viewer.web_process.find_spec", lambda name: name if name in there else None)
+    with pytest.raises(WebError) as caught:
         web_place("8000", None)
+    remedy = "install rover-companion[web] (in the project's folder: .venv/bin/pip install -e '.[web]')"
+    assert str(caught.value) == f"--web: {says} installed; {remedy}"
 
 
 def test_a_port_that_is_taken_is_told_at_once() -> None:
