@@ -41,7 +41,7 @@ export class Headline {
     setText(this.spoken, trouble ? trouble.replace(/ since.*/, "") : (frame?.line ?? ""));
     setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
     setText(this.mission, scene?.mission ?? "");
-    setText(this.badge, scene ? badge(scene, state === "ended") : "");
+    setText(this.badge, scene ? badge(scene, state === "ended", trouble, open) : "");
     setText(this.clock, frame ? namedClock(frame.t, scene) : "");
     // A report keeps the title of its file.
     if (scene && scene.live !== false)
@@ -49,10 +49,16 @@ export class Headline {
   }
 }
 
-function badge(scene, ended) {
-  if (scene.truth) return "live, simulator";
-  const source = !scene.live ? (scene.cut ? "record, cut short" : "record") : ended ? "ended" : "live";
-  return [source, scene.simulated ? "simulated" : ""].filter(Boolean).join(", ");
+function badge(scene, ended, trouble, open) {
+  const recorded = scene.cut ? "record, cut short" : "record";
+  const source = scene.live ? (ended ? "ended" : liveness(trouble, open)) : recorded;
+  const kind = scene.truth ? "simulator" : scene.simulated ? "simulated" : "";
+  return [source, kind].filter(Boolean).join(", ");
+}
+
+function liveness(trouble, open) {
+  if (!open) return "not connected";
+  return trouble ? "not live" : "live";
 }
 
 function lastKnown(frame) {

@@ -137,6 +137,25 @@ tell([heads, drawn({ frame }), drawn({ frame: { pose: [0, 0, 0] } }), drawn({ fr
     assert before == ["No position of the rover yet", "The map begins with it"] and placed == mapped == []
 
 
+def test_only_what_is_fresh_is_called_live(tmp_path: Path) -> None:
+    script = """
+const { Headline } = await import("./headline.js");
+const headline = new Headline();
+const [drives, ended] = [{ state: "driving", t: 1 }, { state: "ended", t: 2 }];
+const [run, simulator, record] = [{ live: true }, { live: true, truth: true }, { live: false }];
+const shown = [
+  [run, drives, "", true], [run, drives, "No connection since 3 s", false],
+  [run, drives, "Not connected: a token is needed", false], [run, drives, "No data since 3 s", true],
+  [run, ended, "", false], [simulator, drives, "", true], [simulator, drives, "No connection since 3 s", false],
+  [simulator, ended, "", false], [record, drives, "", false],
+];
+tell(shown.map((one) => (headline.show(...one), headline.badge.textContent)));
+"""
+    badges = ran(tmp_path, DOCUMENT + script)
+    assert badges[:5] == ["live", "not connected", "not connected", "not live", "ended"]
+    assert badges[5:] == ["live, simulator", "not connected, simulator", "ended, simulator", "record"]
+
+
 def test_marks_that_would_cover_each_other_are_smaller(tmp_path: Path) -> None:
     script = """
 const { radii } = await import("./layer_marks.js");
