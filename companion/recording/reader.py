@@ -133,6 +133,8 @@ def _meta(directory: Path) -> RecordMeta:
     try:
         with open_file(file) as opened:
             data = opened.read(MAX_META_BYTES + 1)
+    except NotADirectoryError as error:
+        raise RecordError(f"{directory} is no record: give the directory of a record") from error
     except OSError as error:
         raise RecordError(f"{file}: cannot be read: {error.strerror}; give the directory of a record") from error
     try:

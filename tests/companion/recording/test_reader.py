@@ -53,6 +53,14 @@ def test_all_that_was_recorded_is_read(record: Path) -> None:
     assert all(len(entry.heard) == 2 and len(entry.said) == 1 for entry in ticks[1:])
 
 
+def test_a_file_is_no_record(tmp_path: Path) -> None:
+    file = tmp_path / "yard.toml"
+    file.write_text("name = 'Yard'\n", encoding="utf-8")
+    with pytest.raises(RecordError) as told:
+        load_record(file)
+    assert str(told.value) == f"{file} is no record: give the directory of a record"
+
+
 def test_the_state_that_a_resumed_run_writes_on_has_not_changed(copy: Path, tmp_path: Path) -> None:
     state, source = b"as it was", tmp_path / "mission.state"
     (copy / "inputs" / "mission.state").write_bytes(state)
