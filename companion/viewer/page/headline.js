@@ -3,10 +3,13 @@
 import { make, setAttribute, setText } from "viewer/dom.js";
 import { setIcon } from "viewer/icons.js";
 import { distance, wayLeft } from "viewer/geometry.js";
-import { metres, namedClock, number, sentence } from "viewer/words.js";
+import { heading, metres, namedClock, number, sentence } from "viewer/words.js";
 
 /** A line of more letters than this is written smaller. */
 const LONG = 40;
+/** A rover that is slower turns on the spot if it turns faster than that. */
+const STANDS_M_S = 0.05;
+const TURNS_RAD_S = 0.1;
 const SIGNS = new Set(["driving", "waiting", "stopped", "ended", "connecting"]);
 
 export class Headline {
@@ -79,5 +82,15 @@ function reason(frame, state) {
   const way = Number.isFinite(rest)
     ? `${metres(rest)} to go`
     : `${metres(distance(frame.pose, frame.goal.place))} away`;
-  return `${way} · ${number(Math.abs(frame.speed ?? NaN))} m/s`;
+  const turning = turningOnTheSpot(frame);
+  return turning ? `${turning} · ${way}` : `${way} · ${number(Math.abs(frame.speed ?? NaN))} m/s`;
+}
+
+// Where a rover that turns without getting on turns to; empty for one that drives.
+function turningOnTheSpot({ setpoint, pose, speed, turn }) {
+  if (setpoint?.kind === "heading") return `Turning to ${heading(setpoint.heading)}`;
+  if (!(Math.abs(speed) < STANDS_M_S && Math.abs(turn) > TURNS_RAD_S)) return "";
+  if (setpoint?.kind !== "position") return `Turning ${turn > 0 ? "right" : "left"}`;
+  const [north, east] = setpoint.place;
+  return `Turning to ${heading(Math.atan2(east - pose[1], north - pose[0]))}`;
 }
