@@ -124,8 +124,8 @@ class Recorder:
     ) -> None:
         """``files``: further input files by kind; they are copied. None: there is no file of that kind.
 
-        ``start_us``: the start in microseconds since 1970, by default now. ``lidars``: those on the companion's own
-        ports, as they were given. Raises RecordError if the directory cannot be written.
+        ``start_us``: the start in microseconds since 1970, by default when the first tick begins. ``lidars``: those on
+        the companion's own ports, as they were given. Raises RecordError if the directory cannot be written.
         """
         self.directory = unused(directory)
         self.problem = ""
@@ -137,6 +137,7 @@ class Recorder:
         self._closed = False
         self._worker = worker
         self._clock_at_start_s: float | None = None
+        self._start_given = start_us is not None
         self._flushed_s = 0.0
         self._tick: TickEntry | None = None
         self._ticks = 0
@@ -180,6 +181,9 @@ class Recorder:
     def heard(self, time_s: float, packets: list[bytes], mark: Mark = Mark(0)) -> None:  # noqa: B008 - frozen
         """A new tick, and the packets that were heard in it."""
         self._end_tick()
+        if self._clock_at_start_s is None and not self._start_given:
+            # Time of day and the companion's clock at one moment: the planner may have been loaded since it was made.
+            self._clock_at_start_s, self._meta.start_unix_us = time_s, unix_time_us()
         self._tick = TickEntry(time_s, len(packets), 0, mark)
         for raw in packets:
             self._packet(time_s, raw)

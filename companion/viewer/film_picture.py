@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from companion.executive.mission_progress import TargetStatus
 from companion.viewer.film_names import film_names
 from companion.viewer.map_colours import CELL_COLOURS, UNKNOWN_COLOUR
 from companion.viewer.map_tiles import TILE, cells_of
@@ -37,6 +38,8 @@ ARROW = ((12.0, 0.0), (-8.0, 8.0), (-4.0, 0.0), (-8.0, -8.0))
 INK, HALO, ROVER, PATH = (13, 19, 25), (255, 255, 255), (224, 74, 0), (224, 74, 0)
 TRACK, BORDER, GOAL, REACHED = (31, 122, 148), (142, 42, 107), (224, 140, 0), (0, 102, 90)
 CONTACT, MOVER = (168, 32, 13), (106, 63, 192)
+MARKS: dict[str, tuple[int, int, int]] = {TargetStatus.REACHED: REACHED, TargetStatus.UNREACHABLE: CONTACT}
+"""Colours of targets by what has become of them; GOAL for all others."""
 STATES = {
     "driving": ((11, 92, 173), HALO),
     "waiting": ((255, 197, 49), (22, 16, 0)),
@@ -170,16 +173,25 @@ class FilmPicture:
         (x, y), r = self._at(place), FINER * radius
         pen.ellipse((x - r, y - r, x + r, y + r), colour, HALO, FINER)
 
-    def _cross(self, pen: ImageDraw.ImageDraw, place: Sequence[float]) -> None:
-        (x, y), r = self._at(place), FINER * 7.0
-        for colour, width in ((HALO, 5), (CONTACT, 3)):
+    def _cross(
+        self,
+        pen: ImageDraw.ImageDraw,
+        place: Sequence[float],
+        radius: float = 7.0,
+        strokes: Sequence[tuple[Colour, int]] = ((HALO, 5), (CONTACT, 3)),
+    ) -> None:
+        """``radius``, and ``strokes``: colours and widths, the lowest first; in pixels of the picture."""
+        (x, y), r = self._at(place), FINER * radius
+        for colour, width in strokes:
             for way in (1.0, -1.0):
                 pen.line([(x - r, y - way * r), (x + r, y + way * r)], colour, FINER * width)
 
     def _targets(self, pen: ImageDraw.ImageDraw, statuses: Sequence[str]) -> None:
         for number, target in enumerate(self._scene["targets"]):
-            reached = number < len(statuses) and statuses[number] == "reached"
-            self._disc(pen, target["place"], 6.0, REACHED if reached else GOAL)
+            status = statuses[number] if number < len(statuses) else ""
+            self._disc(pen, target["place"], 6.0, MARKS.get(status, GOAL))
+            if status == TargetStatus.UNREACHABLE:
+                self._cross(pen, target["place"], 3.0, ((HALO, 2),))
 
     def _names(self, pen: ImageDraw.ImageDraw) -> None:
         """The targets' names."""

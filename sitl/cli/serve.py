@@ -117,6 +117,8 @@ def serve(
 
             run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, log, observe)
         log.end(simulator)
+        if feed is not None:
+            feed.end(clock.now_s())
     if not quiet:
         touched = len(simulator.collisions)
         say(f"stopped after {simulator.time_s:.0f} s of the rover's time and {touched} collision{'s' * (touched != 1)}")

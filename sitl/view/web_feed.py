@@ -23,6 +23,7 @@ from sitl.view.watching import AutopilotState, Rates
 
 HEARD_S = 5.0
 """So long after a client's last packet, in real time, it counts as connected."""
+STOPPED = "the simulator was stopped"
 
 Json = dict[str, Any]
 
@@ -65,6 +66,16 @@ class WebFeed:
         except Exception as error:  # a picture is not worth a stop
             self._ended = True
             self._say(f"the page has no more news, the simulator goes on: {type(error).__name__}: {error}")
+
+    def end(self, now_s: float) -> None:
+        """The last moment. ``now_s``: real seconds."""
+        if self._ended:
+            return
+        self._ended = True
+        try:
+            self._put({**self._frame(now_s), "news": self._news, "state": "ended", "line": STOPPED, "why": ""})
+        except Exception as error:  # what was asked for on the terminal has still to be told
+            self._say(f"the page is not told of the end: {type(error).__name__}: {error}")
 
     def _show(self, now_s: float) -> None:
         was, self._was = self._was, AutopilotState(self._simulator)

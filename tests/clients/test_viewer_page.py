@@ -228,7 +228,8 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.press("Enter token to act")
             desktop.run("document.querySelector('#token').value = 'not the token'")
             desktop.press("Connect")
-            desktop.shows("This token is wrong")
+            desktop.shows("This token is wrong", f"Driving to {name}")
+            assert "Not connected" not in desktop.text, "who may look on goes on looking"
             fits(desktop, PHONE)
             desktop.press("Cancel")
             desktop.shows(f"Driving to {name}", "Enter token to act")

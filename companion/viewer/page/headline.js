@@ -3,10 +3,13 @@
 import { make, setAttribute, setText } from "viewer/dom.js";
 import { setIcon } from "viewer/icons.js";
 import { distance, wayLeft } from "viewer/geometry.js";
-import { metres, namedClock, number, sentence } from "viewer/words.js";
+import { heading, metres, namedClock, number, sentence } from "viewer/words.js";
 
 /** A line of more letters than this is written smaller. */
 const LONG = 40;
+/** A rover that is slower turns on the spot if it turns faster than that. */
+const STANDS_M_S = 0.05;
+const TURNS_RAD_S = 0.1;
 const SIGNS = new Set(["driving", "waiting", "stopped", "ended", "connecting"]);
 
 export class Headline {
@@ -41,7 +44,7 @@ export class Headline {
     setText(this.spoken, trouble ? trouble.replace(/ since.*/, "") : (frame?.line ?? ""));
     setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
     setText(this.mission, scene?.mission ?? "");
-    setText(this.badge, scene ? badge(scene, state === "ended") : "");
+    setText(this.badge, scene ? badge(scene, state === "ended", trouble, open) : "");
     setText(this.clock, frame ? namedClock(frame.t, scene) : "");
     // A report keeps the title of its file.
     if (scene && scene.live !== false)
@@ -49,10 +52,16 @@ export class Headline {
   }
 }
 
-function badge(scene, ended) {
-  if (scene.truth) return "live, simulator";
-  const source = !scene.live ? (scene.cut ? "record, cut short" : "record") : ended ? "ended" : "live";
-  return [source, scene.simulated ? "simulated" : ""].filter(Boolean).join(", ");
+function badge(scene, ended, trouble, open) {
+  const recorded = scene.cut ? "record, cut short" : "record";
+  const source = scene.live ? (ended ? "ended" : liveness(trouble, open)) : recorded;
+  const kind = scene.truth ? "simulator" : scene.simulated ? "simulated" : "";
+  return [source, kind].filter(Boolean).join(", ");
+}
+
+function liveness(trouble, open) {
+  if (!open) return "not connected";
+  return trouble ? "not live" : "live";
 }
 
 function lastKnown(frame) {
@@ -73,5 +82,15 @@ function reason(frame, state) {
   const way = Number.isFinite(rest)
     ? `${metres(rest)} to go`
     : `${metres(distance(frame.pose, frame.goal.place))} away`;
-  return `${way} · ${number(Math.abs(frame.speed ?? NaN))} m/s`;
+  const turning = turningOnTheSpot(frame);
+  return turning ? `${turning} · ${way}` : `${way} · ${number(Math.abs(frame.speed ?? NaN))} m/s`;
+}
+
+// Where a rover that turns without getting on turns to; empty for one that drives.
+function turningOnTheSpot({ setpoint, pose, speed, turn }) {
+  if (setpoint?.kind === "heading") return `Turning to ${heading(setpoint.heading)}`;
+  if (!(Math.abs(speed) < STANDS_M_S && Math.abs(turn) > TURNS_RAD_S)) return "";
+  if (setpoint?.kind !== "position") return `Turning ${turn > 0 ? "right" : "left"}`;
+  const [north, east] = setpoint.place;
+  return `Turning to ${heading(Math.atan2(east - pose[1], north - pose[0]))}`;
 }

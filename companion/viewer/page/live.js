@@ -35,7 +35,7 @@ class LivePage {
     this.charts = new Charts(charts, this.model);
     this.actions = new Actions(bar, viewer, this.model, this.view, {
       send: (message) => this.link.send(message),
-      askToken: () => this.askToken("Whoever knows it may act.", () => {}),
+      askToken: () => this.askToAct("Whoever knows it may act."),
     });
     addFiguresButton(this.parts);
     watchEdges(this.parts, this.view);
@@ -67,9 +67,14 @@ class LivePage {
   }
 
   deny(text) {
+    forgetToken();
+    if (this.freeToSee && this.link.token) {
+      this.enter(null); // who may look on without a token goes on looking
+      this.askToAct(text);
+      return;
+    }
     this.denied = true;
     this.refresh();
-    forgetToken();
     // Who gave a wrong one may still be allowed to look on without any.
     this.askToken(text, this.link.token ? () => this.enter(null) : null);
   }
@@ -83,6 +88,10 @@ class LivePage {
     askToken(this.parts.viewer, text, (token) => this.enter(token), cancelled);
   }
 
+  askToAct(text) {
+    this.askToken(text, () => {});
+  }
+
   enter(token) {
     this.denied = false;
     this.link.token = token;
@@ -92,6 +101,7 @@ class LivePage {
   take(message) {
     if (message.kind === "answer") this.actions.take(message);
     else this.model.take(message);
+    if (message.kind === "scene" && this.link.token === null) this.freeToSee = true;
     if (message.kind === "frame") this.heard = performance.now();
   }
 

@@ -12,7 +12,8 @@ from companion.core.tick_marks import Mark
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.mission.serialization import from_json
-from companion.recording.record_format import RecordError, TickEntry, unpacked_ticks
+from companion.recording import recorder as recorder_module
+from companion.recording.record_format import STAMP, RecordError, TickEntry, unpacked_ticks
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
 from tests.support.mavlink_vehicle import Station
@@ -41,6 +42,20 @@ def test_a_ground_stations_tools_read_the_packets(tmp_path: Path, mission: Missi
     assert [entry[1:] for entry in got] == [(1, "LOCAL_POSITION_NED"), (191, "HEARTBEAT")] * 10
     assert got[0][0] > 1.6e9, "seconds since 1970"
     assert got[-1][0] - got[0][0] == pytest.approx(4.5, abs=1e-5)
+
+
+def test_the_time_of_day_is_noted_when_the_first_tick_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    unix_us = [1_795_650_000_000_000]
+    monkeypatch.setattr(recorder_module, "unix_time_us", lambda: unix_us[0])
+    recorder = Recorder(tmp_path / "run", None, Settings(), 0)
+    unix_us[0] += 2_500_000  # so long the planner took to load
+    recorder.begin(100.0, Mark.BEGIN)
+    unix_us[0] += 400_000
+    recorder.heard(100.25, [])
+    recorder.said(100.25, Station().heartbeat())
+    recorder.close()
+    assert STAMP.unpack((tmp_path / "run" / "link.tlog").read_bytes()[:8])[0] == 1_795_650_002_750_000
+    assert json.loads((tmp_path / "run" / "meta.json").read_text())["start_unix_us"] == 1_795_650_002_500_000
 
 
 def test_decisions_and_what_it_was_run_with(tmp_path: Path, mission: Mission) -> None:

@@ -137,6 +137,41 @@ tell([heads, drawn({ frame }), drawn({ frame: { pose: [0, 0, 0] } }), drawn({ fr
     assert before == ["No position of the rover yet", "The map begins with it"] and placed == mapped == []
 
 
+def test_only_what_is_fresh_is_called_live(tmp_path: Path) -> None:
+    script = """
+const { Headline } = await import("./headline.js");
+const headline = new Headline();
+const [drives, ended] = [{ state: "driving", t: 1 }, { state: "ended", t: 2 }];
+const [run, simulator, record] = [{ live: true }, { live: true, truth: true }, { live: false }];
+const shown = [
+  [run, drives, "", true], [run, drives, "No connection since 3 s", false],
+  [run, drives, "Not connected: a token is needed", false], [run, drives, "No data since 3 s", true],
+  [run, ended, "", false], [simulator, drives, "", true], [simulator, drives, "No connection since 3 s", false],
+  [simulator, ended, "", false], [record, drives, "", false],
+];
+tell(shown.map((one) => (headline.show(...one), headline.badge.textContent)));
+"""
+    badges = ran(tmp_path, DOCUMENT + script)
+    assert badges[:5] == ["live", "not connected", "not connected", "not live", "ended"]
+    assert badges[5:] == ["live, simulator", "not connected, simulator", "ended, simulator", "record"]
+
+
+def test_a_rover_that_turns_on_the_spot_does_not_just_drive_with_no_speed(tmp_path: Path) -> None:
+    script = """
+const { Headline } = await import("./headline.js");
+const headline = new Headline();
+const frame = { state: "driving", t: 1, pose: [0, 0, 0], goal: { name: "X", place: [0, 12] }, speed: 0.01, turn: 0.5 };
+const moments = [
+  { setpoint: { kind: "heading", heading: 0.9076 } }, { setpoint: { kind: "position", place: [3, 3] } },
+  { setpoint: { kind: "velocity", speed: 0, turn: -0.5 }, turn: -0.5 }, { speed: 0.8 }, { turn: 0 },
+];
+tell(moments.map((one) => (headline.show({ live: true }, { ...frame, ...one }, "", true), headline.why.textContent)));
+"""
+    turning, driving = ["Turning to 052°", "Turning to 045°", "Turning left"], ["0.8 m/s", "0.0 m/s"]
+    whole = [f"{one} · 12.0 m away" for one in turning] + [f"12.0 m away · {one}" for one in driving]
+    assert ran(tmp_path, DOCUMENT + script) == whole
+
+
 def test_marks_that_would_cover_each_other_are_smaller(tmp_path: Path) -> None:
     script = """
 const { radii } = await import("./layer_marks.js");

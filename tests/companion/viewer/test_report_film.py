@@ -7,7 +7,16 @@ from typing import Any
 import pytest
 from PIL import ImageFont
 
-from companion.viewer.film_picture import SIDE_PIXELS, _font_file, section_of
+from companion.viewer.film_picture import (
+    CONTACT,
+    GOAL,
+    HALO,
+    REACHED,
+    SIDE_PIXELS,
+    FilmPicture,
+    _font_file,
+    section_of,
+)
 from companion.viewer.report_film import MOST_PICTURES, Film, FilmError
 
 GROUND = {"south_m": -50.0, "west_m": -50.0, "cell_m": 0.25, "columns": 400, "rows": 400, "tile": 64}
@@ -41,6 +50,22 @@ def test_every_picture_has_the_same_even_size() -> None:
     pictures = list(made.pictures())
     assert {one.size for one in pictures} == {made.size} and len(pictures) == 12
     assert made.size[0] == SIDE_PIXELS and made.size[1] % 2 == 0
+
+
+def test_the_mark_of_a_target_shows_what_has_become_of_it() -> None:
+    scene = {**SCENE, "targets": [{"name": "", "place": [0.0, 10.0]}]}
+    section = section_of(scene, [(0.0, 0.0), (0.0, 10.0)])
+    frame = {"pose": None, "path": [], "movers": [], "line": "", "state": "ended", "speed": 0.0, "t": 0.0}
+    x = round(((10.0 + 50.0) / 0.25 - section.x0) * section.scale)
+    y = round(section.height - (50.0 / 0.25 - section.y0) * section.scale)
+
+    def spots(status: str) -> list[object]:
+        """Colours in the middle of the mark, and above it within the disc."""
+        picture = FilmPicture(scene, section).drawn({**frame, "statuses": [status]}, [], [])
+        return [picture.getpixel((x, y)), picture.getpixel((x, y - 4))]
+
+    assert spots("reached") == [REACHED] * 2 and spots("pending") == spots("skipped") == [GOAL] * 2
+    assert spots("unreachable") == [HALO, CONTACT], "a cross on a disc"
 
 
 @pytest.mark.parametrize("places", [[(0.0, 0.0)], [(0.0, 0.0), (90.0, 1.0)], [(-300.0, 5.0), (10.0, 400.0)]])

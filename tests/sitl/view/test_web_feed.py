@@ -87,6 +87,16 @@ def test_it_says_what_it_waits_for_and_what_it_does_until_it_touches_a_wall() ->
     assert watched.said == []
 
 
+def test_a_simulator_that_is_stopped_says_so_last_and_once() -> None:
+    watched = Watched()
+    watched.run_to(1.0)
+    watched.feed.end(1.1)
+    told = len(watched.page.frames)
+    last = watched.run_to(2.0)
+    assert (last["state"], last["line"], last["why"]) == ("ended", "the simulator was stopped", "")
+    assert len(watched.page.frames) == told and watched.said == []
+
+
 def test_the_map_is_the_world_as_it_is_now() -> None:
     watched = Watched()
     frame = watched.run_to(1.0)
