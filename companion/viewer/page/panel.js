@@ -102,7 +102,7 @@ export class Panel {
       );
       return { node: make("li", {}, button), sign, status, far };
     });
-    const left = this.model.scene.targets.length - targets.length;
+    const left = (this.model.scene?.targets?.length ?? 0) - targets.length;
     this.targets.replaceChildren(
       ...this.targetRows.map((row) => row.node),
       ...(left > 0 ? [make("li", { class: "nothing" }, `${left} more are not listed; the map shows them.`)] : []),
