@@ -17,6 +17,7 @@ from sitl.experiments.experiment import Options
 RUNS = 2
 
 
+@pytest.mark.thorough
 def test_achour_table1(tmp_path):
     file, docs = tmp_path / "figures.json", tmp_path / "docs"
     arguments = ["experiment", NAME, "--runs", str(RUNS), "--seed", "50", "--json", str(file), "--docs", str(docs)]

@@ -69,6 +69,7 @@ def check_results_do_not_depend_on_the_number_of_jobs(alone, both):
             assert one[key][:2] == two[key]
 
 
+@pytest.mark.thorough
 def test_table_1(tmp_path):
     file, docs = tmp_path / "table.json", tmp_path / "docs"
     arguments = ["experiment", "kwasniewski-table1", "--runs", "10", "--json", str(file), "--docs", str(docs)]

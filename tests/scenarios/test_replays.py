@@ -347,6 +347,7 @@ def test_why_tells_the_seconds_since_the_beginning(copy: Path) -> None:
     assert f"decision 2 at {time_s:.2f} s" in result.output
 
 
+@pytest.mark.thorough
 def test_drive_records_what_it_was_given(tmp_path: Path) -> None:
     given = ["--settings", str(tmp_path / "s.toml"), "--sensors", str(MISSIONS / "sensors" / "weathered.toml")]
     (tmp_path / "s.toml").write_text("[guidance]\nhorizon_m = 6.0\n")

@@ -106,6 +106,7 @@ def test_it_gets_through_posts_and_touches_none_whatever_the_rover_is(gain: floa
     assert np.median([seconds for left_m, _, seconds in results if left_m <= 0.5]) < 14.0
 
 
+@pytest.mark.thorough
 def test_without_a_guard_it_goes_slower_and_touches_nothing_either() -> None:
     guarded, strict = driven(posts(1), 1), driven(posts(1), 1, settings=STRICT)
     assert strict[1] > 0.0 and strict[2] > guarded[2]

@@ -71,6 +71,7 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Page:
     return page
 
 
+@pytest.mark.thorough
 def test_pause_go_on_send_and_skip_and_the_record_is_replayed(page: Page) -> None:
     page.ticks(0.1)
     assert page.ask("skip", goal="far end") == page.ask("goto", place=[1.0, 1.0]) == NOT_DRIVING

@@ -17,6 +17,7 @@ def test_every_way_spends_the_same_epochs_at_most():
 
 
 @pytest.mark.thorough
+@pytest.mark.thorough
 def test_it_repeats_and_writes_its_part_of_the_docs(tmp_path):
     reports = [run(Options(runs=4, seed=5), lambda done, total: None) for _ in range(2)]
     results = [report.as_json()["results"] for report in reports]

@@ -81,6 +81,7 @@ def test_turn_rate_acceleration_velocity_and_place_fit_together(
             assert math.dist(moved, [0.5 * (a + b) * step_s for a, b in zip(old, new, strict=True)]) <= slack_m
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("turning_radius_m", [0.0, 2.0], ids=["skid", "ackermann"])
 @settings(max_examples=3, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
