@@ -138,13 +138,18 @@ def done_one_by_one(
 ) -> Iterator[Job]:
     """Run all jobs, in a process for each processor; yields each when it is done. ``Chosen`` follows all others.
 
+    Of those that need not wait, the first in the list begins first.
+
     Raises BrokenProcessPool when the system has ended one of the processes. Whoever asks for no more ends them.
     """
     waiting, done = list(jobs), set[Job]()
     running: dict[Future[None], Job] = {}
-    with ProcessPoolExecutor(processes or os.cpu_count(), get_context("spawn")) as pool, _ended_with_us():
+    side_by_side = processes or os.cpu_count() or 1
+    with ProcessPoolExecutor(side_by_side, get_context("spawn")) as pool, _ended_with_us():
         while waiting or running:
-            for job in [job for job in waiting if done.issuperset(_before(job, jobs, after))]:
+            ready = [job for job in waiting if done.issuperset(_before(job, jobs, after))]
+            # No more than there are processes: the pool begins them in the order in which it was given them.
+            for job in ready[: side_by_side - len(running)]:
                 waiting.remove(job)
                 with _ctrl_c_waits():  # this starts a process if none is idle
                     running[pool.submit(job)] = job

@@ -40,19 +40,19 @@ def physics() -> None:
     scenario_from_mission(Mission("", ())).physics(0, linked=False).rehearse()
 
 
-FOR_A_DRIVE: Sequence[Job] = (genetic_planner, simulator, graph_searches, drive)
+FOR_A_DRIVE: Sequence[Job] = (genetic_planner, graph_searches, simulator, drive)
 FOR_ALL: Sequence[Job] = (
     genetic_planner,
-    vertex_planners,
-    simulator,
     graph_searches,
-    other_planners,
+    simulator,
     drive,
-    physics,
-    manoeuvres,
     motions,
+    vertex_planners,
+    other_planners,
+    manoeuvres,
+    physics,
 )
-"""Those that take longest and that others wait for come first."""
+"""Those that others wait for and that take longest come first."""
 
 AFTER: Mapping[Job, Sequence[Job]] = {
     **companions.AFTER,

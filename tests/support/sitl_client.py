@@ -88,8 +88,8 @@ class Client:
 
 def ready(simulator: Simulator, **identity: int) -> Client:
     """A client of an armed rover in GUIDED."""
+    simulator.advance_to_s(READY_S)
     client = Client(simulator, **identity)
-    client.run_to(READY_S)
     assert client.set_mode(15) == 0
     assert client.arm() == 0
     return client
