@@ -22,23 +22,22 @@ demo: $(KERNELS)
 	@echo "driving missions/rooms.toml ..."
 	@$(BIN)/rover-sitl drive missions/rooms.toml --image out/rooms.png --map out/rooms-map
 
-# The linters and the compiler side by side, then the tests.
-test: $(TOOLS)
-	@$(MAKE) --no-print-directory --jobs=2 lint $(ALL_KERNELS)
-	@$(MAKE) --no-print-directory collect
+# The tools are installed while kernels are compiled, then come linters and tests.
+test: $(PROGRAM)
+	@$(MAKE) --no-print-directory --jobs=3 lint collect $(ALL_KERNELS)
 	@$(MAKE) --no-print-directory pytest
 
 # Compiles the tests to bytecode once; each of the workers that begin with none would do it for itself. What cannot be
 # collected is told by the tests that follow.
-collect: $(ALL_KERNELS)
+collect: $(TOOLS)
 	@$(BIN)/python -m pytest --collect-only -q > /dev/null || true
 
 # More workers than processors: many tests wait for real time.
-pytest: $(ALL_KERNELS)
+pytest: $(TOOLS) $(ALL_KERNELS)
 	$(BIN)/python -m pytest -n 5 --dist worksteal
 
 # With the drives that show a little more and take long: every mission with every sensor suite, more seeds.
-test-all: $(ALL_KERNELS)
+test-all: $(TOOLS) $(ALL_KERNELS)
 	$(BIN)/python -m pytest -n 5 --dist worksteal -m ""
 
 lint: $(TOOLS)
@@ -47,11 +46,11 @@ lint: $(TOOLS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 
-bench: $(ALL_KERNELS)
+bench: $(TOOLS) $(ALL_KERNELS)
 	$(BIN)/python -m pytest tests/bench --override-ini addopts= -q -s --benchmark-columns=median,min,max,rounds
 
 # Looks for inputs that break something: new ones every time, for SECONDS in all.
-fuzz: $(ALL_KERNELS)
+fuzz: $(TOOLS) $(ALL_KERNELS)
 	$(BIN)/python -m tests.fuzz all properties --seconds $(SECONDS)
 
 results: $(TOOLS)
@@ -74,23 +73,23 @@ soak: $(KERNELS)
 # The environment, with the versions of constraints.txt; once it is there, no network is needed. PYTHON=... chooses the
 # interpreter; otherwise it is the first one that works.
 $(PROGRAM): pyproject.toml constraints.txt
+	@for python in $(or $(PYTHON),$(CANDIDATES)); do \
+	  if "$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	    echo "making $(VENV) with $$("$$python" --version) ..."; "$$python" -m venv $(VENV); exit; \
+	  fi; \
+	done; \
+	echo "rover-companion needs Python 3.11 or newer with its venv module; tried: $(or $(PYTHON),$(CANDIDATES))" >&2; exit 1
 	@$(call install,.,the program: about 450 MB)
 	@touch $(PROGRAM)
 
-$(TOOLS): pyproject.toml constraints.txt
-	@$(call install,.[test],the program and the tools of its tests: about 1.4 GB)
-	@touch $(PROGRAM) $(TOOLS)
+# Beside the compiler, which needs the program only and finds it in this folder.
+$(TOOLS): $(PROGRAM)
+	@$(call install,.[test],the tools of its tests: another GB)
+	@touch $(TOOLS)
 
 define install
-for python in $(or $(PYTHON),$(CANDIDATES)); do \
-  if "$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
-    echo "making $(VENV) with $$("$$python" --version) ..." && \
-    "$$python" -m venv $(VENV) && \
-    echo "installing $(2) ..." && \
-    $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '$(1)'; exit; \
-  fi; \
-done; \
-echo "rover-companion needs Python 3.11 or newer with its venv module; tried: $(or $(PYTHON),$(CANDIDATES))" >&2; exit 1
+echo "installing $(2) ..." && \
+$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '$(1)'
 endef
 
 # Compiled before they are needed, in several processes. Kernels whose sources have not changed are only loaded.
@@ -99,7 +98,7 @@ $(KERNELS): $(PROGRAM) $(SOURCES)
 	@$(BIN)/python -m sitl.cli.compile
 	@touch $(KERNELS)
 
-$(ALL_KERNELS): $(TOOLS) $(SOURCES)
+$(ALL_KERNELS): $(PROGRAM) $(SOURCES)
 	@echo "compiling all kernels, once: some minutes ..."
 	@$(BIN)/python -m sitl.cli.compile --all
 	@touch $(KERNELS) $(ALL_KERNELS)

@@ -170,11 +170,26 @@ def weigh(log_odds, base, penalty, weights, window, occupied_at, radius_cells):
     for y in range(max(0, y0 * s - reach), min(height * s, y1 * s + reach)):
         for x in range(max(0, x0 * s - reach), min(width * s, x1 * s + reach)):
             if log_odds[y, x] >= occupied_at:
-                for fy in range(max(y0, (y - reach) // s), min(y1, (y + reach) // s + 1)):
-                    for fx in range(max(x0, (x - reach) // s), min(x1, (x + reach) // s + 1)):
-                        distance = math.hypot(x + 0.5 - (fx + 0.5) * s, y + 0.5 - (fy + 0.5) * s)
-                        if distance < radius_cells or (x // s == fx and y // s == fy):
-                            weights[fy, fx] = 1.0
+                _close_round(weights, window, s, x, y, radius_cells)
+
+
+@njit(cache=True, nogil=True)
+def _close_round(weights, window, s, x, y, radius_cells):
+    """Close the field of a cell, and those of the window whose middle lies nearer to the cell's than the radius."""
+    x0, y0, x1, y1 = window
+    fx, fy = x // s, y // s
+    if x0 <= fx < x1 and y0 <= fy < y1:
+        weights[fy, fx] = 1.0
+    # Squares, not roots: most fields of the box are compared in vain.
+    cx, cy, square = x + 0.5, y + 0.5, radius_cells * radius_cells
+    reach = int(math.ceil(radius_cells))
+    last_y, last_x = min(y1, (y + reach) // s + 1), min(x1, (x + reach) // s + 1)
+    for fy in range(max(y0, (y - reach) // s), last_y):
+        aside = cy - (fy + 0.5) * s
+        for fx in range(max(x0, (x - reach) // s), last_x):
+            ahead = cx - (fx + 0.5) * s
+            if ahead * ahead + aside * aside < square:
+                weights[fy, fx] = 1.0
 
 
 @njit(cache=True, nogil=True)

@@ -15,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.conformance.recordings import FAST, Heard, Recording, Replay, replay
+from tests.support.quick import first_of
 from tests.support.shared_data import needs_shared
 
 pytestmark = needs_shared
@@ -54,7 +55,7 @@ BOUNDS = {
 of the heading add up, so places are not compared."""
 
 
-@pytest.mark.parametrize("recording", FAST, ids=lambda recording: recording.name)
+@first_of(2, "recording", FAST, ids=lambda recording: recording.name)
 def test_the_motion_is_the_firmwares(recording: Recording) -> None:
     """One test for each recording: each is replayed once."""
     one, bounds = replay(recording), BOUNDS[recording.name]

@@ -337,6 +337,7 @@ def watched(place: Path, allowed: list[Path], *arguments: object) -> tuple[int, 
         return finished(child)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_no_file_is_written_outside_of_record_and_state(tmp_path: Path) -> None:
     place, record, state = tmp_path / "place", tmp_path / "record", tmp_path / "state"
@@ -359,6 +360,7 @@ def test_no_file_is_written_outside_of_record_and_state(tmp_path: Path) -> None:
     assert (record / "why-2.png").exists() and any(state.rglob("*"))
 
 
+@pytest.mark.thorough
 def test_the_watcher_sees_what_is_written_elsewhere(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     code, _, said = watched(

@@ -70,6 +70,7 @@ def assert_steered_only_in_the_leg(rig: Asker) -> None:
     assert all(one.armed and (one.mode == AUTO or one.command == SET_MODE) for one in moves)
 
 
+@pytest.mark.thorough
 def test_the_leg_that_is_handed_over_is_driven_round_the_wall(tmp_path: Path) -> None:
     rig = in_auto(tmp_path, ROUND_THE_WALL)
     rig.until(lambda: item(rig) == 2, 30.0)
@@ -312,6 +313,7 @@ def test_a_battery_that_runs_low_in_a_leg_is_the_autopilots_affair(tmp_path: Pat
     assert rig.companion.outcome.broken_off is None
 
 
+@pytest.mark.thorough
 def test_a_run_of_auto_that_is_taken_up_leaves_a_rover_in_guided_to_its_person(tmp_path: Path) -> None:
     rig = in_leg(tmp_path)
     rig.pilot_mode(GUIDED)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from companion.mission.load import load_mission
 from companion.safety.reasons import Doubt, WaitReason
@@ -29,6 +30,7 @@ def test_a_line_that_loses_a_fifth_of_all_packets(tmp_path: Path, seed: int) -> 
     assert_reached(rig)
 
 
+@pytest.mark.thorough
 def test_a_line_that_is_a_fifth_of_a_second_late(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path))
     waiting: deque[bytes] = deque([b""] * 4)

@@ -286,6 +286,7 @@ def simulator(folder: Path, *options: object) -> Iterator[str]:
         yield url
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_a_parameter_file_with_faults_as_people_see_them(tmp_path: Path) -> None:
     wrong = tmp_path / "wrong.param"

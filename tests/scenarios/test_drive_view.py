@@ -132,6 +132,7 @@ def watch(driven: Driven) -> ReportWatch:
     return watch
 
 
+@pytest.mark.thorough
 def test_on_the_page_and_in_the_report_they_stay_too(driven: Driven, watch: ReportWatch) -> None:
     places = [one["targets"][0]["place"] for one in driven.told if one["kind"] == "scene" and one["targets"]]
     assert len({one["map_epoch"] for one in driven.told if one["kind"] == "scene"}) == 3

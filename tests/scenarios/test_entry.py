@@ -120,7 +120,7 @@ def test_the_version_is_told(name: str) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, f"{name} {version('rover-companion')}\n", "")
 
 
-@pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
+@first_of(1, ("number", "word"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
 def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
     tmp_path: Path, number: signal.Signals, word: str
 ) -> None:

@@ -119,6 +119,7 @@ def test_without_the_fence_it_would_have_gone_there(tmp_path: Path) -> None:
     assert min(south, other.nearest_m(1.5, 3.0, 7.0, 10.0)) < 0.35
 
 
+@pytest.mark.thorough
 def test_the_stored_fence_counts_without_being_enabled_if_so_set(tmp_path: Path) -> None:
     settings = parse_settings({"fence": {"heed": "stored"}}, "test")
     rig = driven(tmp_path, stored([*ALL, *NORTH], FENCE_ENABLE=0.0, FENCE_TYPE=4.0, FENCE_MARGIN=0.0), settings)
@@ -176,6 +177,7 @@ def test_a_fence_that_changes_on_the_way_is_heeded_at_once(tmp_path: Path, seed:
     assert rig.nearest_m(*across) > 0.2
 
 
+@pytest.mark.thorough
 def test_a_fence_of_the_same_length_is_noticed_when_it_is_read_again(tmp_path: Path) -> None:
     rig = driven(tmp_path, stored(ALL, **POLYGONS), parse_settings({"fence": {"again_s": 3.0}}, "test"))
     rig.until_driven(1.0)
@@ -284,6 +286,7 @@ def test_a_fence_that_is_switched_on_by_command_is_heeded(tmp_path: Path) -> Non
     assert rig.nearest_m(1.5, 3.0, 7.0, 10.0) > 0.2
 
 
+@pytest.mark.thorough
 @first_of(1, "seed", range(2))
 def test_over_a_bad_line_it_does_not_begin_before_it_knows_the_fence(tmp_path: Path, seed: int) -> None:
     rig, rng = driven(tmp_path, stored([*ALL, *NORTH], **POLYGONS, FENCE_MARGIN=0.0)), np.random.default_rng(seed)

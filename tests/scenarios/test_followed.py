@@ -13,6 +13,7 @@ from tests.support.rig import GATE, GUIDED, HOLD, Rig, yard
 ANOTHER = "The autopilot follows another target than the one sent"
 
 
+@pytest.mark.thorough
 def test_a_target_that_is_not_taken_is_told_of(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path, GATE + "speed_m_s = 0.8\n"), late_s=45.0)
 

@@ -72,7 +72,8 @@ def rig(tmp_path: Path) -> Rig:
 # The gate -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
+@first_of(
+    1,
     ("bad", "doubt"),
     [(with_fix(FLOAT), Doubt.GPS_POOR), (without("GPS_RAW_INT"), Doubt.GPS_SILENT), (Stale(), Doubt.GPS_SILENT)],
     ids=["float", "silent", "stale"],

@@ -77,6 +77,7 @@ def driven(mission: Mission, limit_s: float) -> tuple[float, list[str]]:
     return came_m, [text for text in drive.companion.outcome.said if "uarded" in text]
 
 
+@pytest.mark.thorough
 def test_it_is_told_at_the_start(guarded: Mission) -> None:
     """On open ground the rover comes as far without it: positions lead there (narrow ground: test_barn.py)."""
     assert guarded.sitl is not None

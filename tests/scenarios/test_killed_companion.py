@@ -21,6 +21,7 @@ def drives() -> list[KilledDrive]:
     return deaths_of(with_motors(mission, Motors.EAGER), Motors.EAGER, 3, 5)
 
 
+@pytest.mark.thorough
 def test_it_dies_often_enough_and_each_mission_ends_without_a_contact(drives: list[KilledDrive]) -> None:
     deaths = [len(drive.deaths) for drive in drives]
     assert sum(deaths) >= 5 > sum(deaths[:-1]) and min(deaths) > 0

@@ -25,6 +25,7 @@ from sitl.scenario import scenario_from_mission, with_faults, with_lidars, with_
 from sitl.sensors.range_sensors import Defect
 from sitl.sensors.serial_lidar import SerialLidar
 from tests.sitl.network.test_server import free_port
+from tests.support.quick import first_of
 from tests.support.records import START_US
 from tests.support.rig import yard
 from tests.support.served import finished, mission_path, process, wait_until
@@ -48,7 +49,8 @@ def drive(
     return run
 
 
-@pytest.mark.parametrize(
+@first_of(
+    1,
     "name",
     [
         "LD19",
@@ -63,6 +65,7 @@ def test_every_model_leads_a_rover_round_the_wall(tmp_path: Path, name: str) -> 
     assert (report.outcome, report.collisions) == (DriveOutcome.REACHED, 0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "mounting", [pytest.param("yaw=120,x=0.3,y=-0.2", marks=pytest.mark.thorough), "flip,yaw=-60,x=-0.3"]
 )
@@ -101,6 +104,7 @@ def test_a_rover_whose_lidar_fails_stops_touches_nothing_and_says_so(tmp_path: P
     assert any(says in line for line in run.report.said), run.report.said
 
 
+@pytest.mark.thorough
 def test_a_rover_whose_lidar_gets_no_echo_any_more_stops_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -148,6 +152,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "record"
 
 
+@pytest.mark.thorough
 def test_a_record_whose_lidar_bytes_are_cut_is_replayed_as_far_as_they_go(record: Path, tmp_path: Path) -> None:
     copy = Path(shutil.copytree(record, tmp_path / "copy"))
     data = (copy / "lidars.bin").read_bytes()

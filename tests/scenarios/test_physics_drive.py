@@ -32,7 +32,7 @@ from tests.support.split_vehicle import SplitVehicle
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize("turning_radius_m", [0.0, 2.0], ids=["skid", "ackermann"])
+@first_of(1, "turning_radius_m", [0.0, 2.0], ids=["skid", "ackermann"])
 @first_of(1, "target_m", [(20.0, 0.0), (8.0, -12.0)])
 def test_the_same_autopilot_drives_over_the_interface_as_in_the_simulator(
     turning_radius_m: float, target_m: tuple[float, float]

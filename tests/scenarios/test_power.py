@@ -151,6 +151,7 @@ def test_an_empty_battery_stops_it_where_it_is(tmp_path: Path, change: dict[str,
     assert rig.speed_m_s < 0.05
 
 
+@pytest.mark.thorough
 def test_it_empties_on_the_way_back(tmp_path: Path) -> None:
     rig = Draining(yard(tmp_path), 9.0, {"percent": 15})
     rig.until(lambda: rig.reason is PowerReason.CHARGE, 5.0)

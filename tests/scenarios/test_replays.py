@@ -302,7 +302,8 @@ def test_why_takes_a_moment_and_shows_the_decision_in_force(record: Path, tmp_pa
         assert result.exit_code == 0 and result.output.startswith(f"decision {number} at {after_s} s")
 
 
-@pytest.mark.parametrize(
+@first_of(
+    2,
     ("options", "says"),
     [
         (["--why", "0"], "there is no decision 0, the last one is"),

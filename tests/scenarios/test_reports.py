@@ -407,6 +407,7 @@ def test_what_cannot_be_written_is_one_line_and_no_record_is_harmed(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.thorough
 @first_of(1, ("option", "place"), [("--out", "r.html"), ("--gif", "r.gif"), ("--mcap", "r.mcap"), ("--csv", "csv")])
 def test_a_full_disk_leaves_what_was_there_and_nothing_cut(
     record: Path, tmp_path: Path, option: str, place: str
@@ -430,6 +431,7 @@ def broken_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recorded(folder / "record", yard(folder), limit_s=52.5)
 
 
+@pytest.mark.thorough
 def test_a_report_reaches_the_last_moment_of_a_drive_that_was_broken_off_and_says_so(
     broken_off: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -106,6 +106,7 @@ polygon_fields = [[8, 5], [8, 9], [10, 9], [10, 5]]
 """
 
 
+@pytest.mark.thorough
 def test_a_place_refused_again_is_told_again(driving: Asker) -> None:
     for _ in range(3):
         driving.reposition(driving.field(40, 7))

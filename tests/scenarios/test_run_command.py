@@ -102,6 +102,7 @@ def test_a_port_in_use_is_one_line_and_exit_code_2(tmp_path: Path, scheme: str, 
     assert str(port) in result.stderr and "stop the other program" in result.stderr
 
 
+@pytest.mark.thorough
 def test_a_peer_that_is_not_there_is_waited_for_until_ctrl_c(tmp_path: Path) -> None:
     path = mission_path(yard(tmp_path))
     with socket.socket() as closed:

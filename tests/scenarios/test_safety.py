@@ -329,6 +329,7 @@ def shifted(north_m: float, east_m: float) -> Any:
     return change
 
 
+@pytest.mark.thorough
 def test_a_position_jump_is_noticed_and_the_map_forgotten(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path), late_s=0.0)
     rig.until_driven(2.0)

@@ -10,7 +10,7 @@ import pytest
 
 from companion.control.controller import ControlCommand, Purpose
 from companion.control.drag import BACK_M_S, FORGOTTEN_S, SLACK_M_S, STALE_S, DragWatch, braked_harder
-from companion.control.local_view import MOST_FURTHER_M
+from companion.control.local_view import MOST_FURTHER_M, LocalView
 from companion.core.frames import Pose
 from companion.mission.bounds import Bounds
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
@@ -66,14 +66,18 @@ def test_or_it_is_as_shipped(known: dict[str, float]) -> None:
 
 
 STAND = ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, 0.0), 0.0)
-HELD = replace(view(ground(), HERE, 0.3), held_m_s=1.0)
+
+
+def held_back() -> LocalView:
+    return replace(view(ground(), HERE, 0.3), held_m_s=1.0)
 
 
 def test_a_rover_that_is_held_and_rolls_on_is_told_to_roll_back_until_it_stands() -> None:
-    back = braked_harder(STAND, HELD, Bounds())
+    held = held_back()
+    back = braked_harder(STAND, held, Bounds())
     assert back.purpose is Purpose.BRAKE
     assert isinstance(back.setpoint, GuidedVelocity) and back.setpoint == GuidedVelocity(-BACK_M_S[0], 0.0)
-    for free in (replace(HELD, held_m_s=0.1), replace(HELD, speed_m_s=0.05), replace(HELD, rolls_back=True)):
+    for free in (replace(held, held_m_s=0.1), replace(held, speed_m_s=0.05), replace(held, rolls_back=True)):
         assert braked_harder(STAND, free, Bounds()) == STAND
 
 
@@ -85,7 +89,7 @@ def test_any_other_command_stays_as_it_is() -> None:
         GuidedHeading(1.0),
     ):
         command = ControlCommand(Purpose.DRIVE, setpoint, 1.0)
-        assert braked_harder(command, HELD, Bounds()) == command
+        assert braked_harder(command, held_back(), Bounds()) == command
 
 
 @pytest.mark.parametrize(("wall_m", "back_m_s"), [(7.0, 1.0), (3.5, 0.5), (2.0, 0.25), (0.6, 0.0)])

@@ -68,6 +68,7 @@ def every_tick(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(feed, name, -1.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("every_tick")
 def test_a_whole_drive_is_told_and_is_no_other_for_it() -> None:
     alone, run, heard = new_drive(), new_drive(), Heard()

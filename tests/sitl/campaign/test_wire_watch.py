@@ -14,6 +14,7 @@ from sitl.campaign.wire_watch import WireWatch
 from sitl.campaign.worded import faults_of
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
+from tests.support.quick import first_of
 from tests.support.rig import yard
 
 PILOT = "pilot start_s=3 since=driving mode=HOLD"
@@ -27,7 +28,7 @@ def watched(folder: Path, faults: str, limit_s: float = 62.0) -> tuple[Drive, Wi
     return run, WireWatch(run)
 
 
-@pytest.mark.parametrize("faults", [PILOT, SILENT])
+@first_of(1, "faults", [PILOT, SILENT])
 def test_a_companion_as_it_is_breaks_nothing(tmp_path: Path, faults: str) -> None:
     run, watch = watched(tmp_path, faults)
     run.run()

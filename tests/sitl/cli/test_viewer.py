@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 from sitl.cli.commands import app
 from tests.sitl.network.test_server import free_port
 from tests.support.pseudo_terminal import ended, on_a_terminal
+from tests.support.quick import first_of
 
 MISSION = "[grid]\nsize = [20, 20]\nhome = [1, 1]\n[[target]]\nfield = [9, 9]\n"
 
@@ -32,6 +33,7 @@ def test_serving_gives_the_terminal_back_and_needs_no_colours(tmp_path: Path) ->
     assert b"\x1b[38;" not in drawn.written and b"\x1b[48;" not in drawn.written
 
 
+@pytest.mark.thorough
 def test_driving_gives_the_terminal_back_when_it_is_ended(tmp_path: Path) -> None:
     mission = tmp_path / "open.toml"
     mission.write_text(MISSION.replace("20, 20", "2000, 20").replace("9, 9", "1990, 9"))
@@ -41,7 +43,7 @@ def test_driving_gives_the_terminal_back_when_it_is_ended(tmp_path: Path) -> Non
     assert b"stopped by SIGTERM" in drawn.last and b"Traceback" not in drawn.written
 
 
-@pytest.mark.parametrize(("columns", "rows"), [(40, 10), (80, 24)])
+@first_of(1, ("columns", "rows"), [(40, 10), (80, 24)])
 def test_the_last_picture_of_a_drive_stays_on_the_terminal_and_under_it_the_outcome(
     tmp_path: Path, columns: int, rows: int
 ) -> None:

@@ -48,6 +48,7 @@ def figures_of(world: Path, name: str) -> dict[tuple[str, str], dict[str, object
     return {(one["planner"], one["map"]): one for one in json.loads(file.read_text())["results"]}
 
 
+@pytest.mark.thorough
 def test_navigation_drives_each_planner_through_given_maps(world: Path) -> None:
     once, again = figures_of(world, "one.json"), figures_of(world, "two.json")
     maps, kinds = ("one-obstacle", "clutter", "rooms", "complex", "slit"), [f"made {kind}" for kind in navigation.KINDS]

@@ -31,6 +31,7 @@ from sitl.experiments.monotone_reach import COLUMNS, ROWS, fewest_switches
 from sitl.experiments.sedighi_spaces import crossing, given_spaces, own_spaces
 from tests.support.chance import more_than, usual_counts
 from tests.support.planning_maps import drawn
+from tests.support.quick import first_of
 from tests.support.shared_data import SHARED, needs_shared
 
 SEEDS = 200
@@ -225,7 +226,8 @@ def test_a_forerunner_keeps_its_restriction():
     assert (after.modes == (0, 9, 9)).all()
 
 
-@pytest.mark.parametrize(
+@first_of(
+    1,
     ("name", "percent"),
     [("SPSet01", 93.3), ("SPSet07", 86.7), pytest.param("SPSet08", 73.3, marks=pytest.mark.thorough)],
 )
