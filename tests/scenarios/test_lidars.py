@@ -49,17 +49,7 @@ def drive(
     return run
 
 
-@first_of(
-    1,
-    "name",
-    [
-        "LD19",
-        pytest.param("RPLIDAR-A1", marks=pytest.mark.thorough),
-        pytest.param("YDLIDAR-X4", marks=pytest.mark.thorough),
-        pytest.param("LD06", marks=pytest.mark.thorough),
-        pytest.param("RPLIDAR-C1", marks=pytest.mark.thorough),
-    ],
-)
+@first_of(1, "name", ["LD19", "RPLIDAR-A1", "YDLIDAR-X4", "LD06", "RPLIDAR-C1"])
 def test_every_model_leads_a_rover_round_the_wall(tmp_path: Path, name: str) -> None:
     report = drive(tmp_path, name).report
     assert (report.outcome, report.collisions) == (DriveOutcome.REACHED, 0)
