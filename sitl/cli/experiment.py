@@ -38,10 +38,11 @@ EXPERIMENTS = (
 """Each is a module of ``sitl.experiments``, loaded when it is asked for: they load the plotting library."""
 ON_ANY_MAP = ("navigation", "driving")
 OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
-WITH_CONTROLLERS = ("barn", "controllers", "gates", "killed-companion", "missions")
-WITH_MISMATCH = ("barn", "controllers", "gates", "killed-companion", "missions")
+WITH_CONTROLLERS = ("barn", "controllers", "dead-companion", "gates", "killed-companion", "missions")
+WITH_MISMATCH = ("barn", "controllers", "dead-companion", "gates", "killed-companion", "missions")
+WITH_LATE = ("barn", "controllers", "gates", "killed-companion", "missions")
 DRIVES = ("barn", "controllers", "dead-companion", "driving", "gates", "killed-companion", "missions", "traffic")
-WITH_GUARD = ("killed-companion", "missions")
+WITH_GUARD = ("dead-companion", "killed-companion", "missions")
 EXIT_FAILED = 3
 LINES = 10
 """Of progress, where there is no terminal for a bar."""
@@ -78,7 +79,7 @@ def experiment(
         str,
         typer.Option(
             help=f"{', '.join(WITH_CONTROLLERS)}: what leads the rover, names separated by commas; default: all, for "
-            "gates motion-ga, for killed-companion and missions points."
+            "gates motion-ga, for dead-companion, killed-companion and missions points."
         ),
     ] = "",
     setups: Annotated[
@@ -92,7 +93,8 @@ def experiment(
         str, typer.Option(help="missions: names of shipped missions, separated by commas; default: all.")
     ] = "",
     guard: Annotated[
-        bool, typer.Option("--guard", help="killed-companion, missions: with the guard on the autopilot.")
+        bool,
+        typer.Option("--guard", help="dead-companion, killed-companion, missions: with the guard on the autopilot."),
     ] = False,
     off: Annotated[
         float,
@@ -103,7 +105,7 @@ def experiment(
     late: Annotated[
         float,
         typer.Option(
-            min=0.0, max=2.0, help=f"{', '.join(WITH_MISMATCH)}: seconds that a message takes over the link, each way."
+            min=0.0, max=2.0, help=f"{', '.join(WITH_LATE)}: seconds that a message takes over the link, each way."
         ),
     ] = 0.0,
     keep: Annotated[
@@ -174,7 +176,7 @@ def _refuse_unused_motion(name: str, options: Options) -> None:
         ("--controllers", bool(options.controllers), WITH_CONTROLLERS),
         ("--guard", options.guard, WITH_GUARD),
         ("--off", options.off != OFF_MODEL, WITH_MISMATCH),
-        ("--late", options.late_s > 0.0, WITH_MISMATCH),
+        ("--late", options.late_s > 0.0, WITH_LATE),
         ("--keep", options.keep is not None, DRIVES),
         ("--missions", bool(options.missions), ("missions",)),
     ):

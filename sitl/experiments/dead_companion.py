@@ -1,7 +1,8 @@
 """What happens when the companion fails: every shipped mission, cut off at a random moment until the rover stands.
 
 The autopilot follows the last setpoint that it got, a position for ever and a velocity for three seconds. So no
-setpoint may be one that the rover cannot be left alone with.
+setpoint may be one that the rover cannot be left alone with. With any controller, with or without the guard on the
+autopilot.
 """
 
 from __future__ import annotations
@@ -17,10 +18,23 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Mission, SitlSpec
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
-from sitl.experiments.experiment import Advance, ExperimentError, ExperimentReport, Options, each, shipped_missions
+from companion.settings.settings import ControllerKind
+from companion.settings.settings_file import parse_settings
+from sitl.experiments.experiment import (
+    GUARD,
+    POINTS,
+    Advance,
+    ExperimentError,
+    ExperimentReport,
+    Options,
+    chosen_controllers,
+    each,
+    shipped_missions,
+)
+from sitl.experiments.off_model import scenario_off_model
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
-from sitl.scenario import scenario_from_mission
+from sitl.scenario import Scenario, scenario_from_mission
 from sitl.simulator import Simulator
 from sitl.world.truth import STOOD_M_S
 
@@ -30,7 +44,9 @@ MISSIONS = (
     "field.plan", "field.waypoints", "ackermann.toml", "crossing.toml", "depot.toml",
 )  # fmt: skip
 SUITES = ("lidar-90", "lidar-360", "beams")
-HEAD = ("mission", "runs", "moving", "touched", "run into", "m/s", "metres", "s")
+HEAD = ("mission", "led by", "runs", "moving", "touched", "run into", "m/s", "metres", "s")
+FROM_A_DRIVE = 40
+"""So many deaths at most: for more, the mission is driven again with another seed."""
 TIME_LIMIT_S = 1800.0
 STANDS_S, STANDS_M_S, STANDS_RAD_S = 4.0, 0.02, 0.02
 """A rover stands that has neither moved nor turned for longer than a velocity is remembered."""
@@ -44,6 +60,8 @@ class Death:
 
     mission: str
     suite: str
+    controller: str
+    """What really led the rover."""
     seed: int
     time_s: float
     speed_m_s: float
@@ -60,6 +78,8 @@ class Told:
     """A whole drive, as what its companion said: until when the world moved on, and the bytes it got before that."""
 
     mission: Mission
+    scenario: Scenario
+    controller: str
     seed: int
     words: tuple[tuple[float, bytes], ...]
     begin_s: float
@@ -72,20 +92,25 @@ class Told:
         return str(self.mission.sitl.sensors) if self.mission.sitl is not None else ""
 
 
-def overheard(mission: Mission, seed: int, settings: Settings | None = None) -> Told:
-    """Drive the mission with its companion alive, and keep what it says. ``settings``: None for the defaults."""
-    scenario = scenario_from_mission(mission)
+def overheard(mission: Mission, seed: int, settings: Settings | None = None, scenario: Scenario | None = None) -> Told:
+    """Drive the mission with its companion alive, and keep what it says.
+
+    ``settings``: None for the defaults. ``scenario``: None for the mission's own.
+    """
+    scenario = scenario or scenario_from_mission(mission)
     drive = Drive(mission, scenario, settings or Settings(), seed, NullRecorder(), TIME_LIMIT_S)
     words: list[tuple[float, bytes]] = []
     drive.clock.overhear = lambda time_s, said: words.append((time_s, said))
     report = drive.run()
     began_s = report.sim_time_s - report.driving_time_s
-    return Told(mission, seed, tuple(words), began_s, report.sim_time_s)
+    executor = drive.companion.mission_run.executor
+    led_by = POINTS if executor is None else executor.controller
+    return Told(mission, scenario, led_by, seed, tuple(words), began_s, report.sim_time_s)
 
 
 def die(told: Told, time_s: float) -> Death:
     """The same drive, but nothing more is said from a moment on. The simulator does the same on hearing the same."""
-    simulator = scenario_from_mission(told.mission).simulator(told.seed)
+    simulator = told.scenario.simulator(told.seed)
     link = simulator.connect(name="companion")
     for until_s, said in told.words:
         if until_s > time_s:
@@ -101,6 +126,7 @@ def die(told: Told, time_s: float) -> Death:
     return Death(
         told.mission.name,
         told.suite,
+        told.controller,
         told.seed,
         time_s,
         speed_m_s,
@@ -135,6 +161,18 @@ class DeadReport(ExperimentReport):
         return [terminal_table(f"{NAME}: {suite}", HEAD, self._rows(suite)) for suite in self._suites()]
 
     @property
+    def section_name(self) -> str:
+        """See ``ExperimentReport``."""
+        if self.options.guard:
+            return f"{NAME}-guarded"
+        return f"{NAME}-strict" if self._planned else NAME
+
+    @property
+    def _planned(self) -> int:
+        """Deaths in drives in which motions were planned."""
+        return sum(death.controller != POINTS for death in self.deaths)
+
+    @property
     def failure(self) -> str:
         """Contacts."""
         touched = sum(death.touched for death in self.deaths)
@@ -150,33 +188,48 @@ class DeadReport(ExperimentReport):
 
     def _rows(self, suite: str) -> list[list[str]]:
         own = [death for death in self.deaths if death.suite == suite]
-        names = dict.fromkeys(death.mission for death in own)
-        return [_row(name, [d for d in own if d.mission == name]) for name in names] + [_row("all", own)]
+        kinds = dict.fromkeys((death.mission, death.controller) for death in own)
+        rows = [_row(*kind, [d for d in own if (d.mission, d.controller) == kind]) for kind in kinds]
+        return [*rows, _row("all", "", own)]
 
     def section(self) -> str:
         """See ``ExperimentReport``."""
         tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in self._suites())
         touched, run_into = sum(d.touched for d in self.deaths), sum(d.run_into for d in self.deaths)
-        return f"""## A companion that falls dead
+        with_guard = ", with the guard" if self.options.guard else ""
+        return f"""## A companion that falls dead{" while it plans motions" if self._planned else ""}{with_guard}
 
 `{self.options.command(NAME)}`
 
 {len(self.deaths)} runs: each mission driven with each suite of sensors, and the companion silent for ever at
-{self.options.runs} moments drawn evenly from that drive; then watched until the rover had stood for {STANDS_S:g} s.
-*moving* counts the runs in which it moved when that happened; *touched* the contacts while it moved on: **{touched}**;
-*run into*: it stood already (slower than {STOOD_M_S:g} m/s), and something that moves came along: {run_into}. *m/s*:
-the fastest it was; *metres*, *s*: how far and how long it went on at most.
-
+{self.options.runs} moments drawn evenly from its drives (at most {FROM_A_DRIVE} from one); then watched until the
+rover had stood for {STANDS_S:g} s. *moving* counts the runs in which it moved when that happened; *touched* the
+contacts while it moved on: **{touched}**; *run into*: it stood already (slower than {STOOD_M_S:g} m/s), and something
+that moves came along: {run_into}. *m/s*: the fastest it was; *metres*, *s*: how far and how long it went on at most.
+{self._rover()}
 {tables}
 """
 
+    def _rover(self) -> str:
+        """What is not as usual, as a paragraph."""
+        said = ""
+        if self._planned:
+            said = f"""
+Motions were planned in the drives with {self._planned} of these deaths; speed, lag, turn rate and limits of a rover
+that turns on the spot are {self.options.mismatch}. In the others points led the rover.
+"""
+        if self.options.guard:
+            said += f"\nThe guard on the autopilot waits {GUARD['SCR_USER1']:g} ms.\n"
+        return said
 
-def _row(name: str, deaths: list[Death]) -> list[str]:
+
+def _row(name: str, controller: str, deaths: list[Death]) -> list[str]:
     def most(values: Iterable[float]) -> str:
         return f"{max(values, default=0.0):.1f}"
 
     return [
         name,
+        controller,
         f"{len(deaths)}",
         f"{sum(d.speed_m_s > 0.1 for d in deaths)}",
         f"{sum(d.touched for d in deaths)}",
@@ -188,22 +241,36 @@ def _row(name: str, deaths: list[Death]) -> list[str]:
 
 
 def run(options: Options, advance: Advance) -> DeadReport:
-    """Each mission driven once with each suite, and from each drive as many deaths as there are runs.
+    """Each mission with each suite and controller, with as many deaths as there are runs.
 
     Does not depend on ``jobs``.
     """
-    missions = [with_suite(mission, suite) for mission in shipped(options) for suite in SUITES]
+    drives = [
+        (with_suite(mission, suite), controller, options.guard, options.off)
+        for controller in chosen_controllers(options, (POINTS,))
+        for mission in shipped(options)
+        for suite in SUITES
+    ]
+    shares = [min(FROM_A_DRIVE, options.runs - first) for first in range(0, options.runs, FROM_A_DRIVE)]
+    tasks = [
+        (*one, options.seed + number + len(drives) * again, count)
+        for number, one in enumerate(drives)
+        for again, count in enumerate(shares)
+    ]
     deaths: list[Death] = []
-    tasks = ((mission, options.seed + number, options.runs) for number, mission in enumerate(missions))
     for done, some in enumerate(each(options.jobs, deaths_of, tasks, options.keep), start=1):
         deaths += some
-        advance(done, len(missions))
+        advance(done, len(tasks))
     return DeadReport(options, tuple(deaths))
 
 
-def deaths_of(mission: Mission, seed: int, count: int) -> list[Death]:
-    """One drive, cut off at so many moments, drawn evenly from it."""
-    told = overheard(mission, seed)
+def deaths_of(
+    mission: Mission, controller: ControllerKind, guarded: bool, off: float, seed: int, count: int
+) -> list[Death]:
+    """One drive, cut off at so many moments, drawn evenly from it. ``off``: where motions are planned."""
+    scenario = scenario_off_model(mission, seed, 0.0 if controller == POINTS else off, guarded=guarded)
+    settings = parse_settings({"guidance": {"controller": controller}}, NAME)
+    told = overheard(mission, seed, settings, scenario)
     moments_s = np.random.default_rng((seed, count)).uniform(told.begin_s, told.end_s, count)
     return [die(told, float(moment_s)) for moment_s in moments_s]
 

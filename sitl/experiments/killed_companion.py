@@ -38,11 +38,10 @@ from sitl.experiments.experiment import (
     chosen_controllers,
     each,
 )
-from sitl.experiments.off_model import off_model
+from sitl.experiments.off_model import scenario_off_model
 from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table
 from sitl.experiments.soak import Person
 from sitl.lockstep import Drive
-from sitl.scenario import scenario_from_mission
 from sitl.world.truth import STOOD_M_S
 
 NAME = "killed-companion"
@@ -167,12 +166,8 @@ def drive_with_deaths(
     """
     suite, settings = str(mission.sitl.sensors) if mission.sitl is not None else "", settings or Settings()
     result = KilledDrive(mission.name, suite, motors, seed)
-    rng, person, scenario = np.random.default_rng((seed, 13)), Person(), scenario_from_mission(mission)
-    if off and motors is Motors.OWN and mission.rover.turning_radius_m <= 0.0:
-        drivetrain, limits = off_model(np.random.default_rng((seed, 54)), off)
-        scenario = replace(scenario, drivetrain=drivetrain, parameters={**scenario.parameters, **limits})
-    if guarded:
-        scenario = replace(scenario, parameters={**scenario.parameters, **GUARD})
+    rng, person = np.random.default_rng((seed, 13)), Person()
+    scenario = scenario_off_model(mission, seed, off if motors is Motors.OWN else 0.0, guarded=guarded)
     with TemporaryDirectory() as folder:
         place = Path(folder)
         drive = Drive(

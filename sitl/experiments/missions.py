@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -16,7 +16,6 @@ from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
 from sitl.experiments.dead_companion import SUITES, shipped, with_suite
 from sitl.experiments.experiment import (
-    GUARD,
     OFF_MODEL,
     POINTS,
     Advance,
@@ -26,10 +25,9 @@ from sitl.experiments.experiment import (
     each,
 )
 from sitl.experiments.intervals import mean_interval
-from sitl.experiments.off_model import off_model
+from sitl.experiments.off_model import scenario_off_model
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
-from sitl.scenario import scenario_from_mission
 
 NAME = "missions"
 NO_WAY = ("Sealed",)
@@ -72,12 +70,7 @@ def drive(
     ``late_s``: so long each message takes over the link, each way.
     """
     suite = str(mission.sitl.sensors) if mission.sitl is not None else ""
-    scenario = scenario_from_mission(mission)
-    if mission.rover.turning_radius_m <= 0.0:
-        drivetrain, limits = off_model(np.random.default_rng((seed, 54)), off)
-        scenario = replace(scenario, drivetrain=drivetrain, parameters={**scenario.parameters, **limits})
-    if guarded:
-        scenario = replace(scenario, parameters={**scenario.parameters, **GUARD})
+    scenario = scenario_off_model(mission, seed, off, guarded=guarded)
     settings = parse_settings({"guidance": {"controller": controller}}, NAME)
     run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report, executor = run.run(), run.companion.mission_run.executor

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from companion.mission.mission import RoverSpec
+from companion.mission.mission import Mission, RoverSpec
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.parameters import DEFAULTS
 from sitl.experiments.experiment import GUARD, POINTS
 from sitl.plant.rover import SIM_ROVER, Drivetrain
+from sitl.scenario import Scenario, scenario_from_mission
 
 
 class Limits(NamedTuple):
@@ -55,3 +57,16 @@ def off_model(rng: np.random.Generator, share: float, limits: Limits = SHIPPED) 
     if limits.acceleration_m_s2 > SHIPPED.acceleration_m_s2:
         parameters["MOT_SLEWRATE"] = 0.0  # else the motors take a second to their full output
     return drivetrain, parameters
+
+
+def scenario_off_model(mission: Mission, seed: int, off: float, *, guarded: bool) -> Scenario:
+    """What the mission is driven in: a rover off its model by up to this share, if it turns on the spot.
+
+    ``guarded``: with the guard on the autopilot.
+    """
+    scenario = scenario_from_mission(mission)
+    if off and mission.rover.turning_radius_m <= 0.0:
+        drivetrain, limits = off_model(np.random.default_rng((seed, 54)), off)
+        scenario = replace(scenario, drivetrain=drivetrain, parameters={**scenario.parameters, **limits})
+    guard = GUARD if guarded else {}
+    return replace(scenario, parameters={**scenario.parameters, **guard})

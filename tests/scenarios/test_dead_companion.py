@@ -43,9 +43,10 @@ def test_what_is_heard_again_is_the_same_drive() -> None:
 
 def test_the_table_counts_what_it_says() -> None:
     deaths = tuple(
-        Death("Yard", "beams", 0, 50.0, speed, touched, 1, 3.0, 5.0) for speed, touched in ((1.0, 2), (0.0, 0))
+        Death("Yard", "beams", "points", 0, 50.0, speed, touched, 1, 3.0, 5.0)
+        for speed, touched in ((1.0, 2), (0.0, 0))
     )
     report = DeadReport(Options(runs=2), deaths)
     (table,) = report.tables()
-    assert [list(column.cells)[-1] for column in table.columns] == ["all", "2", "1", "2", "2", "1.0", "3.0", "5.0"]
+    assert [list(column.cells)[-1] for column in table.columns] == ["all", "", "2", "1", "2", "2", "1.0", "3.0", "5.0"]
     assert report.as_json()["deaths"] == [{name: getattr(death, name) for name in Death.__slots__} for death in deaths]
