@@ -149,5 +149,5 @@ def _state(run: Drive, status: Status) -> str:
     state = f"{status.time_s:6.1f} s  {status.doing}  {status.target}  part {part}  step {status.steps}"
     goal = run.companion.progress.goal if run.companion.progress else None
     if goal is not None and status.pose is not None:
-        state += f"  {status.pose.point.distance_m(goal.point):.0f} m to go"
+        state += f"  {status.pose.point.distance_m(goal.point):.0f} m straight"
     return state

@@ -7,6 +7,7 @@ const OLD_HEARTBEAT_S = 3;
 const LOST_HEARTBEAT_S = 6;
 const SLOW_HZ = 1;
 const LOW_PERCENT = 20;
+const ROLLS_M_S = 0.05;
 
 /** Facts that say nothing any more when it is not known where the rover is. */
 export const OF_PLACE = new Set(["Goal", "Setpoint", "Position"]);
@@ -15,11 +16,13 @@ export const OF_PLACE = new Set(["Goal", "Setpoint", "Position"]);
 export function readouts(frame) {
   const goal = frame?.goal;
   const rest = wayLeft(frame);
+  const speed = Math.abs(frame?.speed ?? NaN);
   const far = Number.isFinite(rest) ? rest : distance(frame?.pose, goal?.place);
   return [
-    ["speed", number(Math.abs(frame?.speed ?? NaN)), "m/s"],
+    // A run may end while the rover still rolls.
+    [frame?.state === "ended" && speed >= ROLLS_M_S ? "last speed" : "speed", number(speed), "m/s"],
     [
-      Number.isFinite(rest) ? "to go" : "to goal",
+      Number.isFinite(rest) ? "along path" : "straight",
       goal ? metres(far).replace(/ .*/, "") : UNKNOWN,
       goal ? (far >= 9999.5 ? "km" : "m") : "",
     ],
@@ -68,8 +71,8 @@ export function trueFacts(frame) {
 }
 
 function packetsOf(link) {
-  const out = `${number(link.out, 0)}/s out`;
-  return link.heard ? `${number(link.in, 0)}/s in, ${out}` : `nobody heard, ${out}`;
+  const out = `${number(link.out, 0)} sent a second`;
+  return link.heard ? `${number(link.in, 0)} heard, ${out}` : `nobody heard, ${out}`;
 }
 
 /** Farther than five metres it is not looked for. */

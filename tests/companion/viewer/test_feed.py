@@ -28,7 +28,7 @@ NEAR_M = 8.0
 KEYS = {
     "kind", "t", "pose", "speed", "turn", "mode", "armed", "drives", "line", "why", "state", "statuses", "goal", "path",
     "motion", "setpoint", "rays", "movers", "figures", "battery", "gps", "decision", "guard", "news", "rates",
-    "contacts", "touched",
+    "contacts", "touched", "paused",
 }  # fmt: skip
 
 
