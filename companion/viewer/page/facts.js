@@ -14,20 +14,25 @@ export const OF_PLACE = new Set(["Goal", "Setpoint", "Position"]);
 
 /** The three large numbers: [name, value, unit]. */
 export function readouts(frame) {
-  const goal = frame?.goal;
-  const rest = wayLeft(frame);
   const speed = Math.abs(frame?.speed ?? NaN);
-  const far = Number.isFinite(rest) ? rest : distance(frame?.pose, goal?.place);
   return [
     // A run may end while the rover still rolls.
     [frame?.state === "ended" && speed >= ROLLS_M_S ? "last speed" : "speed", number(speed), "m/s"],
-    [
-      Number.isFinite(rest) ? "along path" : "straight",
-      goal ? metres(far).replace(/ .*/, "") : UNKNOWN,
-      goal ? (far >= 9999.5 ? "km" : "m") : "",
-    ],
+    howFar(frame),
     ["mode", frame?.mode ?? UNKNOWN, ""],
   ];
+}
+
+// To the goal; of a simulator, which knows none, how far the rover has come.
+function howFar(frame) {
+  if (Number.isFinite(frame?.driven_m)) return ["driven", ...inMetres(frame.driven_m)];
+  const rest = wayLeft(frame);
+  if (Number.isFinite(rest)) return ["along path", ...inMetres(rest)];
+  return frame?.goal ? ["straight", ...inMetres(distance(frame.pose, frame.goal.place))] : ["to goal", UNKNOWN, ""];
+}
+
+function inMetres(far) {
+  return [metres(far).replace(/ .*/, ""), far >= 9999.5 ? "km" : "m"];
 }
 
 /** Rows of [name, value, level]; the level is null, "warning" or "error". */

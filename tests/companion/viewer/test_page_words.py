@@ -195,11 +195,14 @@ def test_distances_and_the_last_speed_are_named_for_what_they_are(tmp_path: Path
 const { readouts } = await import("./facts.js");
 const frame = { pose: [0, 0, 0], goal: { name: "X", place: [0, 12] }, path: [], speed: 0.4, state: "driving" };
 const path = [[0, 0], [5, 0], [5, 12], [0, 12]];
-const moments = [{}, { path }, { state: "ended" }, { state: "ended", speed: -0.02 }];
+const moments = [
+  {}, { path }, { state: "ended" }, { state: "ended", speed: -0.02 }, { goal: null }, { goal: null, driven_m: 88.34 },
+];
 tell(moments.map((one) => readouts({ ...frame, ...one }).slice(0, 2).map((each) => each.join(" "))));
 """
-    straight, along, rolls, stands = ran(tmp_path, DOCUMENT + script)
+    straight, along, rolls, stands, without, simulator = ran(tmp_path, DOCUMENT + script)
     assert straight == ["speed 0.4 m/s", "straight 12.0 m"] and along[1] == "along path 22.0 m"
+    assert (without[1], simulator[1]) == ("to goal – ", "driven 88.3 m")
     assert (rolls[0], stands[0]) == ("last speed 0.4 m/s", "speed 0.0 m/s")
 
 
