@@ -65,7 +65,8 @@ export class Actions {
   }
 
   button(action, sign, onclick) {
-    const made = make("button", { type: "button", class: "wide", onclick }, icon(sign), make("span", {}, NAMES[action]));
+    const parts = [icon(sign), make("span", {}, NAMES[action])];
+    const made = make("button", { type: "button", class: "wide", onclick }, ...parts);
     this.byAction[action] = made;
     return made;
   }
