@@ -69,7 +69,9 @@ class DrivePermission:
                 self._notifier.tell(f"Stopping: {verdict.reason}", Severity.WARNING)
             case Reaction.HOLD:
                 self._notifier.tell(f"HOLD: {verdict.reason}", Severity.WARNING)
-            case _ if before is Control.COMPANION:
+            case _ if (
+                before is Control.COMPANION and not self._run.paused
+            ):  # a pause has been told when it was asked for
                 self._notifier.tell(f"Companion silent: {verdict.reason}", Severity.WARNING)
             case _:
                 pass

@@ -14,6 +14,7 @@ from typing import Any
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
+from companion.safety.reasons import EndReason
 from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of, told
@@ -48,6 +49,8 @@ class ViewerFeed:
         self.steady = SteadyFrame()
         self.touched: Sequence[Sequence[float]] | None = None
         """Where a simulated rover touched something, north and east; whoever knows it writes it here."""
+        self.ended_by = ""
+        """Why the companion was told to stop, where it was no person that did so."""
 
     def warn(self, text: str) -> None:
         """Something bad that the companion does not know of."""
@@ -125,6 +128,9 @@ class ViewerFeed:
         executor = self._companion.executor
         self.steady.note(None if executor is None else executor.layout.origin)
         frame = self.steady.frame(frame_of(self._companion, status))
+        if self.ended_by and frame["state"] == "ended":
+            stopped = str(EndReason.STOPPED_BY_USER.value)
+            frame["line"] = frame["line"].replace(stopped, f"ended, {self.ended_by}", 1)
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
         frame["contacts"] = None if self.touched is None else len(self.touched)
         frame["touched"] = list((self.touched or ())[-TOUCHED_KEPT:])

@@ -30,7 +30,7 @@ from companion.executive.mission_run import MissionRun
 from companion.mapping.map_queries import clearance_m
 from companion.mission.bounds import Bound
 from companion.mission.mission import Mission
-from companion.navigation.field_step import Part
+from companion.navigation.field_step import Action
 from companion.safety.mode_latch import Control
 from companion.safety.reasons import Activity, EndReason, LatchReason, RunPhase, WaitReason
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
@@ -50,6 +50,7 @@ ROLLS_M_S = 0.15
 MOST_MISSED = 3
 """So many targets that were not reached are named."""
 REACHED = TargetStatus.REACHED
+RESTARTED = "autopilot restarted, rover disarmed"
 MAKES_WAY = "making way for something that moves"
 NOT_REACHED = {TargetStatus.PENDING: "not reached"}
 NEWEST_S = 0.5
@@ -136,6 +137,7 @@ def frame_of(companion: Companion, status: Status) -> Json:
         "gps": _gps(vehicle),
         "decision": 0 if executor is None else executor.decisions,
         "guard": None if executor is None else vehicle.guard_at(now_s) is not None,
+        "paused": run.paused,
         "news": news_of(status),
     }
 
@@ -214,14 +216,9 @@ def doing_of(companion: Companion, status: Status) -> Json:
     """One large line; then what is awaited where it says why the rover stands, or why it drives back."""
     activity, line, why = status.activity, status.doing, ""
     if activity.phase is RunPhase.DRIVING and status.target:
-        line, broken_off = f"driving to {status.target}", companion.outcome.broken_off
-        why = "" if broken_off is None else str(broken_off)
-        if not why and status.decision is not None and status.decision.part is Part.RETURN:
-            why = "going back to find another way"
-        if not why and companion.executor is not None and companion.executor.driver.makes_way:
-            why = MAKES_WAY
+        line, why = _driving(companion, status)
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
-        line, why = _stopped(activity)
+        line, why = _stopped(companion.vehicle, activity)
     elif activity.phase is RunPhase.WAITING:
         line, _, why = line.partition(" (")
         why = why.removesuffix(")")
@@ -235,8 +232,23 @@ def doing_of(companion: Companion, status: Status) -> Json:
     return {"line": line, "why": why, "state": state}
 
 
-def _stopped(activity: Activity) -> tuple[str, str]:
-    """Why it stands, and what for. Data that is missing comes before the mode: mostly the one has led to the other."""
+def _driving(companion: Companion, status: Status) -> tuple[str, str]:
+    """Where to, or that it goes back first; then why the mission was broken off, or that it makes way."""
+    goes_back = status.decision is not None and status.decision.action is Action.BACKTRACK
+    line = f"going back to find another way to {status.target}" if goes_back else f"driving to {status.target}"
+    if companion.outcome.broken_off is not None:
+        return line, str(companion.outcome.broken_off)
+    makes_way = companion.executor is not None and companion.executor.driver.makes_way
+    return line, MAKES_WAY if makes_way else ""
+
+
+def _stopped(vehicle: VehicleState, activity: Activity) -> tuple[str, str]:
+    """Why it stands, and what for. Data that is missing comes before the mode: mostly the one has led to the other.
+
+    An autopilot that has restarted has disarmed the rover, and has led to everything else.
+    """
+    if vehicle.restarted and vehicle.heartbeat is not None and not vehicle.heartbeat.armed:
+        return f"stopped: {RESTARTED}", f"waiting for {activity.awaited}"
     if activity.awaited is not None and activity.awaited.kind is WaitReason.GOOD_DATA_AND:
         data, person = activity.awaited.figures
         return f"stopped: {data}", f"waiting for good data and {person}"
@@ -259,9 +271,11 @@ def _ended(companion: Companion, line: str) -> tuple[str, str]:
     if not missed:
         return line, ""
     more = f", and {len(missed) - MOST_MISSED} more" if len(missed) > MOST_MISSED else ""
-    ended = f"{line}: " if line != str(EndReason.DONE.value) else "ended: "
+    early = companion.outcome.broken_off
+    if line == str(EndReason.DONE.value):
+        line = "ended" if early is None else f"ended early, {early}"
     reached = f"{len(statuses) - len(missed)} of {len(statuses)} targets reached"
-    return ended + reached, ", ".join(missed[:MOST_MISSED]) + more
+    return f"{line}: {reached}", ", ".join(missed[:MOST_MISSED]) + more
 
 
 def mode_of(vehicle: VehicleState, run: MissionRun) -> Json:

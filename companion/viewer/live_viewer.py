@@ -57,6 +57,11 @@ class LiveViewer:
         if self._feed is not None:
             self._feed.warn(text)
 
+    def note_end(self, why: str) -> None:
+        """The companion is told to stop next, not by a person: why, for the large line."""
+        if self._feed is not None:
+            self._feed.ended_by = why
+
     def show(self, status: Status, touched: Sequence[Sequence[float]] | None = None) -> None:
         """To be called after each tick. ``touched``: where a simulated rover touched something, north and east.
 

@@ -129,7 +129,7 @@ def drive(
         if painter is None:
             report = run_with_progress(run, console, pace, also)
         else:
-            report = run_with_view(run, painter, _paced(run, pace), also)
+            report = run_with_view(run, painter, _paced(run, pace, also), also)
         _end(page, f"ended: {report.outcome}")
     except BAD_INPUT as error:
         raise _refused(error) from error
@@ -255,11 +255,11 @@ def _shown(run: Drive, page: LiveViewer, settings: Settings) -> Also:
         log.look(collisions, start)
         page.show(status, [touched.from_start(start) for touched in collisions])
 
-    return Also(show, WEB_EVERY_S)
+    return Also(show, WEB_EVERY_S, page.note_end)
 
 
-def _paced(run: Drive, pace: Pace) -> Callable[[float], None]:
-    unattended = Unattended(run, lambda _: None)  # the view shows what the companion waits for
+def _paced(run: Drive, pace: Pace, also: Also) -> Callable[[float], None]:
+    unattended = Unattended(run, lambda _: None, also.ended)  # the view shows what the companion waits for
 
     def wait(time_s: float) -> None:
         unattended.look(run.companion.status())

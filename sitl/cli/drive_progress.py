@@ -41,6 +41,8 @@ class Also:
 
     show: Callable[[Status], None] = lambda status: None
     every_s: float = TRACK_PERIOD_S
+    ended: Callable[[str], None] = lambda why: None
+    """Told why a run is stopped that nobody stops."""
 
 
 class Unattended:
@@ -49,9 +51,11 @@ class Unattended:
     Also one that does not begin, because data that it needs never comes.
     """
 
-    def __init__(self, run: Drive, say: Callable[[str], None]) -> None:
+    def __init__(self, run: Drive, say: Callable[[str], None], ended: Callable[[str], None]) -> None:
+        """``ended``: told the reason alone."""
         self._run = run
         self._say = say
+        self._tell_why = ended
         self._since_s: float | None = None
         self._ended = False
 
@@ -70,6 +74,7 @@ class Unattended:
         if not self._ended:
             self._ended = True
             self._say(f"{status.time_s:6.1f} s  ended: {why}")
+            self._tell_why(why)
             self._run.companion.stop()
 
 
@@ -106,7 +111,7 @@ def run_with_progress(run: Drive, console: Console, pace: Pace, also: Also = Als
     with Progress(*columns, console=console) as progress:
         task = progress.add_task(run.mission.name, total=None, state="")
         telling = Telling(run, progress.console)
-        unattended = Unattended(run, telling.line)
+        unattended = Unattended(run, telling.line, also.ended)
 
         def observe(status: Status) -> None:
             telling.tell(status)
@@ -125,7 +130,7 @@ def run_with_progress(run: Drive, console: Console, pace: Pace, also: Also = Als
 
 def _run_with_lines(run: Drive, console: Console, pace: Pace, also: Also) -> Report:
     telling, next_s = Telling(run, console), 0.0
-    unattended = Unattended(run, telling.line)
+    unattended = Unattended(run, telling.line, also.ended)
 
     def observe(status: Status) -> None:
         nonlocal next_s
@@ -149,5 +154,5 @@ def _state(run: Drive, status: Status) -> str:
     state = f"{status.time_s:6.1f} s  {status.doing}  {status.target}  part {part}  step {status.steps}"
     goal = run.companion.progress.goal if run.companion.progress else None
     if goal is not None and status.pose is not None:
-        state += f"  {status.pose.point.distance_m(goal.point):.0f} m to go"
+        state += f"  {status.pose.point.distance_m(goal.point):.0f} m straight"
     return state

@@ -16,10 +16,12 @@ from rich.console import Console
 
 from companion.cli.web import Token, Web, WebError, asked_place, served
 from companion.core.clock import WallClock
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.lidar.spec import LidarError, LidarSpec, parsed
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
-from companion.mission.mission import MissionError
+from companion.mission.mission import Mission, MissionError
+from companion.mission.resolve import resolve
 from companion.viewer.terminal.painter import Painter, ViewError, terminal
 from companion.viewer.web_process import WebProcess
 from sitl.faults.fault_file import FaultFileError
@@ -78,7 +80,8 @@ def serve(
             place = asked_place(web, web_token)
             lidars = terminals_of(lidar_pty or ())
             sensors = "none" if lidars and sensors is None else sensors
-            name, scenario = _scenario(mission_file, sensors, params, faults)
+            mission, scenario = _scenario(mission_file, sensors, params, faults)
+            name = mission.name
             scenario = with_lidars(scenario, lidars)
             page = None if place is None else WebProcess(place)
             if page is not None:
@@ -89,7 +92,7 @@ def serve(
             simulator = scenario.simulator(seed)
             watching = Watching(name, simulator)
             told = Told([] if quiet else [watching.tell if view else say])
-            feed = None if page is None else _fed(simulator, page, name, listen, told)
+            feed = None if page is None else _fed(simulator, page, name, listen, told, targets_of(mission, scenario))
             log = EventLog(told.tell, clock.now_s, told.warn)
             endpoints: list[Endpoint] = []
             for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
@@ -171,22 +174,39 @@ class Told:
             self.feed.tell(line, level)
 
 
-def _fed(simulator: Simulator, page: WebProcess, name: str, listen: list[str] | None, told: Told) -> WebFeed:
+def targets_of(mission: Mission, scenario: Scenario) -> list[dict[str, object]]:
+    """Name and place of each target, north and east of the start; none where they cannot be placed."""
+    home = scenario.start.home
+    with contextlib.suppress(MissionError):
+        targets = resolve(mission, LocalFrame(GeoPoint(home.lat_deg, home.lon_deg)), NedPoint(0.0, 0.0)).targets
+        places = [[round(one.point.north_m, 3), round(one.point.east_m, 3)] for one in targets]
+        return [{"name": one.name, "place": place} for one, place in zip(targets, places, strict=True)]
+    return []
+
+
+def _fed(
+    simulator: Simulator,
+    page: WebProcess,
+    name: str,
+    listen: list[str] | None,
+    told: Told,
+    targets: list[dict[str, object]],
+) -> WebFeed:
     """The feed of the page, which is told of events from now on."""
     how = f"it listens on {', '.join(listen)}" if listen else HOW_TO_CONNECT
-    told.feed = WebFeed(simulator, page, name, how, lambda line: typer.echo(line, err=True))
+    told.feed = WebFeed(simulator, page, name, how, lambda line: typer.echo(line, err=True), targets)
     return told.feed
 
 
 def _scenario(
     mission_file: Path, sensors: str | None, params: Path | None, faults: Path | None
-) -> tuple[str, Scenario]:
-    """The mission's name and its simulation with the options; remarks are printed."""
+) -> tuple[Mission, Scenario]:
+    """The mission and its simulation with the options; remarks are printed."""
     mission = equipped(load_mission(mission_file, skip_unknown=True), sensors, params)
     scenario = simulated(mission, faults)
     for note in scenario.notes:
         typer.echo(note, err=True)
-    return mission.name, scenario
+    return mission, scenario
 
 
 def stop_signals() -> list[int]:

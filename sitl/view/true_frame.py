@@ -98,6 +98,7 @@ def frame_of(simulator: Simulator, heard: Sequence[str], rates: Rates, how: str)
         "gps": _gps(vehicle),
         "decision": None,
         "guard": None,
+        "paused": False,
         "driven_m": round(simulator.driven_m, 1),
         "contacts": len(simulator.collisions),
         "touched": [one.from_start(simulator.start) for one in simulator.collisions[-TOUCHED_KEPT:]],

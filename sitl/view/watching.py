@@ -60,12 +60,12 @@ class AutopilotState:
             if not was.is_off:
                 yield "the autopilot has lost power"
         elif was.is_off or was._boots != self._boots:
-            yield f"the autopilot has booted: {self._mode}, {self._armed}"
+            yield f"the autopilot has started anew: {self._mode}, {self._armed}"
         else:
             if self._mode != was._mode:
-                yield f"mode {self._mode}, was {was._mode}"
+                yield f"mode {self._mode} now, {was._mode} before"
             if self._armed != was._armed:
-                yield self._armed
+                yield f"the rover is {self._armed} now"
 
 
 @dataclass
@@ -137,12 +137,12 @@ class Watching:
 
     def vehicle_section(self, now_s: float) -> Section:
         """Mode, motion and health."""
-        simulator, truth, vehicle = self.simulator, self.simulator.truth, self.simulator.vehicle
+        simulator, truth = self.simulator, self.simulator.truth
         began = self._began = self._began or (now_s, simulator.time_s)
         times = (simulator.time_s - began[1]) / max(now_s - began[0], 1e-3)
         north_m, east_m = truth.north_m - simulator.start.north_m, truth.east_m - simulator.start.east_m
         facts = (
-            Fact("mode", f"{vehicle.mode.name}, {'armed' if vehicle.armed else 'disarmed'}"),
+            Fact("mode", _mode(simulator), alarm=simulator.is_off),
             Fact("time", f"{simulator.time_s:.0f} s, {times:.1f} times"),
             Fact("speed", f"{truth.speed_m_s:.2f} m/s"),
             Fact(
@@ -169,6 +169,12 @@ class Watching:
             else:
                 facts += [Fact(name, "", minor=True), Fact("", told, minor=True)]
         return Section("Links", tuple(facts))
+
+
+def _mode(simulator: Simulator) -> str:
+    if simulator.is_off:
+        return "no power"
+    return f"{simulator.vehicle.mode.name}, {'armed' if simulator.vehicle.armed else 'disarmed'}"
 
 
 def _collisions(simulator: Simulator) -> str:

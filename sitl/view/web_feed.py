@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from companion.viewer import wire
@@ -29,16 +29,26 @@ Json = dict[str, Any]
 
 
 class WebFeed:
-    """``name``: of the mission; ``how``: how to connect, for a person; ``say``: told once if the page has to end."""
+    """``name``: of the mission; ``how``: how to connect, for a person; ``say``: told once if the page has to end.
+
+    ``targets``: of the mission, with name and place, for people: the simulator itself knows of none.
+    """
 
     def __init__(
-        self, simulator: Simulator, receiver: Receiver, name: str, how: str, say: Callable[[str], None]
+        self,
+        simulator: Simulator,
+        receiver: Receiver,
+        name: str,
+        how: str,
+        say: Callable[[str], None],
+        targets: Sequence[Json] = (),
     ) -> None:
         self._simulator = simulator
         self._receiver = receiver
         self._name = name
         self._how = how
         self._say = say
+        self._targets = list(targets)
         self._map = TrueMap(simulator.world)
         self._was = AutopilotState(simulator)
         self._scene: Json = {}
@@ -100,7 +110,7 @@ class WebFeed:
         if now_s - self._scene_s < SCENE_S:
             return
         self._scene_s = now_s
-        scene = {**scene_of(self._simulator, self._name), "run": self._run}
+        scene = {**scene_of(self._simulator, self._name), "targets": self._targets, "run": self._run}
         if scene != self._scene and self._put(scene):
             self._scene = scene
 

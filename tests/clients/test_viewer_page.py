@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable
@@ -31,8 +32,13 @@ return [...document.querySelectorAll('body *')].filter(one => one.checkVisibilit
     && (one.getBoundingClientRect().right > innerWidth + 1 || one.getBoundingClientRect().left < -1))
     .map(one => `${one.className}: ${one.textContent.slice(0, 60)}`)
 """
+ORDER = """
+return ['.stage', '.readouts', '.facts-section', '.targets-section', '.news-section', '.charts']
+    .map(name => document.querySelector(name).getBoundingClientRect().top)
+"""
+"""How far down the parts of the page are."""
 OVER_EACH_OTHER = """
-const shown = [...document.querySelectorAll('.map-buttons button, .actions, .strip')]
+const shown = [...document.querySelectorAll('.map-buttons button, .actions, .strip, .legend')]
     .filter(one => one.checkVisibility()).map(one => [one, one.getBoundingClientRect()]);
 return shown.flatMap(([a, p], i) => shown.slice(i + 1).filter(([b, q]) => !a.contains(b) && !b.contains(a)
     && Math.min(p.right, q.right) - Math.max(p.left, q.left) > 1
@@ -126,6 +132,11 @@ return import('viewer/model.js').then(({ Model }) => {
 })
 """
 """From now on no position is heard."""
+LOCKED = """
+return Object.fromEntries([...document.querySelectorAll('.actions button:disabled')].map(one =>
+    [one.innerText.trim(), one.title]))
+"""
+"""Why buttons would do nothing."""
 STRUCK = """
 return [...document.querySelectorAll('.fact')].filter(one =>
     getComputedStyle(one.querySelector('dd')).textDecorationLine === 'line-through')
@@ -190,10 +201,15 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             assert [fault for fault in desktop.faults if "WebSocket" not in fault and "ERR_" not in fault] == []
             desktop.press("Pause")
             desktop.shows("HOLD", "Paused on request")
+            assert "Companion silent" not in desktop.text, "it is told once"
             desktop.press("Go on")
             desktop.shows("GUIDED", "Going on as requested", "Go on: done")
             for _ in range(4):
                 desktop.press("Zoom out (−)")
+            desktop.press("What the signs mean (L)")
+            desktop.shows("What the map shows")
+            assert desktop.run(OVER_EACH_OTHER) == []
+            desktop.press("Close")
             desktop.press("Send here")
             desktop.click_at("canvas", 60, 150)
             desktop.press("Send")
@@ -212,6 +228,8 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.press("Skip target")
             desktop.shows(f"Leave out {name}?")
             fits(desktop, PHONE)
+            desktop.press("Cancel")
+            assert desktop.run("return window.camera.coveredRight") < 80, "one column of buttons"
             zooms(desktop, lambda: desktop.spread("canvas.map", 30, 90))
             assert desktop.run(STRUCK) == []
             desktop.run(LOSE_PLACE)
@@ -247,8 +265,9 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
                 desktop.open("about:blank")
                 desktop.open(f"{address}#token={token.read_text(encoding='ascii').strip()}")
                 desktop.shows("MANUAL")
-                desktop.press("Go on")
-                desktop.shows("Request refused: it was not paused by a request", "The pilot drives (MANUAL)")
+                desktop.shows("The pilot drives (MANUAL)")
+                locked = {"Go on": "Not paused here", "Send here": "Only while the companion drives"}
+                desktop.until(lambda: desktop.run(LOCKED) == locked)
                 another.child.send_signal(signal.SIGINT)
 
 
@@ -276,7 +295,8 @@ def test_the_simulator_alone_is_shown_as_such(tmp_path: Path) -> None:
     with ours(tmp_path, "sitl", *serve) as program, page(DESKTOP) as shown:
         shown.open(address_of(program))
         shown.shows("Simulator: waiting for somebody to connect", "Depot", "live, simulator", "listening on tcp:")
-        assert "Targets" not in shown.text and "Decision" not in shown.text
+        shown.shows("Targets of the mission")
+        assert "pending" not in shown.text and "Decision" not in shown.text
         assert int(str(shown.run(DRAWN))) > 8
         shown.press("What the signs mean (L)")
         shown.shows("open door")
@@ -346,9 +366,10 @@ def test_a_report_plays_from_its_file_to_its_end(report_file: Path) -> None:
         report.press("What the signs mean (L)")
         report.shows("stop on the way")
         report.press("What the signs mean (L)")
+        report.press("Now")
         report.resize(PHONE)
         fits(report, PHONE)
-        report.press("Figures")  # that take the place of the panel there
+        assert report.run(ORDER) == sorted(report.run(ORDER))
         for tab in ("Now", "Decisions", "Tables"):
             report.press(tab)
             fits(report, PHONE)
@@ -414,9 +435,15 @@ def test_records_are_laid_over_each_other(tmp_path: Path) -> None:
     for number in range(2):
         with ours(tmp_path, "sitl", "drive", mission, "--seed", number, "--record", f"rec{number}") as program:
             assert program.ended() == 0
-    with ours(tmp_path, "companion", "report", "rec0", "rec1", "--out", "both.html") as program:
+    shutil.copytree(tmp_path / "rec1", tmp_path / "recorded-in-the-yard-20261126_101112")
+    records = ("rec0", "rec1", "recorded-in-the-yard-20261126_101112")
+    with ours(tmp_path, "companion", "report", *records, "--out", "both.html") as program:
         assert program.ended() == 0, program.output
     with page(DESKTOP) as report:
         report.open((tmp_path / "both.html").as_uri())
         report.shows("rec1")
+        report.press("Tables")
+        report.shows("Differences")
+        scrolls = "return [...document.querySelectorAll('.scroll')].filter(one => one.scrollWidth > one.clientWidth)"
+        assert report.run(f"{scrolls}.length") == 0, "three beside each other fit"
         assert report.faults == []

@@ -23,6 +23,7 @@ from companion.replay.replay import replay
 from companion.settings import Settings
 from companion.viewer import feed
 from companion.viewer.feed import ViewerFeed
+from companion.viewer.frame import RESTARTED
 from companion.viewer.report_data import ReportWatch
 from companion.viewer.terminal.painter import MakeView, Painter
 from companion.viewer.terminal.run_view import RunView
@@ -158,7 +159,7 @@ def test_a_rover_whose_autopilot_does_not_know_where_it_is_is_shown_where_it_was
         stood = [one for one in frames if one["t"] > lost_s]
         assert len(stood) > 100 and np.ptp([one["pose"][:2] for one in stood], axis=0).max() < 1.0
         assert math.dist(stood[0]["pose"][:2], (0.0, 0.0)) > 2.0
-        unknown = [one for one in stood if "EKF has no position" in one["line"]]
+        unknown = [one for one in stood if "EKF has no position" in one["why"]]
         assert len(unknown) > 20 and all(one["rates"]["position_age_s"] > 1.5 and not one["rays"] for one in unknown)
         assert stood[-1]["rates"]["position_age_s"] < 0.5, "it knows again"
         first = next(one for one in frames if one["pose"])
@@ -191,9 +192,11 @@ def test_the_picture_has_the_target_there_too(driven: Driven, tmp_path: Path, mo
 
 def test_the_news_tell_what_pilot_and_power_did(driven: Driven) -> None:
     told = [text.partition(" s: ")[2] for text in driven.views[-1].events]
-    expected = ["mode HOLD, was GUIDED", "mode GUIDED, was HOLD", "the autopilot has lost power"]
-    expected.append("the autopilot has booted: MANUAL, disarmed")
+    expected = ["mode HOLD now, GUIDED before", "mode GUIDED now, HOLD before", "the autopilot has lost power"]
+    expected.append("the autopilot has started anew: MANUAL, disarmed")
     assert [text for text in told if text in expected] == expected
+    modes = {fact.value for view in driven.views for fact in view.sections[0].facts if fact.name == "mode"}
+    assert "no power" in modes
 
 
 def test_the_news_tell_all_that_the_companion_said(driven: Driven) -> None:
@@ -206,11 +209,11 @@ def test_the_news_tell_all_that_the_companion_said(driven: Driven) -> None:
 @pytest.mark.parametrize(("columns", "rows"), [(60, 16), (80, 24), (140, 40)])
 def test_what_is_waited_for_and_the_newest_news_can_be_read(driven: Driven, columns: int, rows: int) -> None:
     status, view = driven.statuses[-1], driven.views[-2]
-    assert len(status.doing) > 44
+    told = f"stopped: {RESTARTED}, waiting for {status.activity.awaited}"
     lines = screen(view, columns, rows)
     assert len(lines) == rows
     below = [line.strip() for line in lines[max(n for n, line in enumerate(lines) if line.startswith("╰")) + 1 :]]
-    assert " ".join(" ".join(below).split()).startswith(status.doing)
+    assert " ".join(" ".join(below).split()).startswith(told)
     assert view.events[-1] in " ".join(below)
 
 

@@ -1,6 +1,6 @@
 // Buttons that tell the rover something: pause, go on, skip the target, go to a place. Only where the source allows it.
 
-import { make, setText } from "viewer/dom.js";
+import { make, setAttribute, setText } from "viewer/dom.js";
 import { distance } from "viewer/geometry.js";
 import { icon, setIcon } from "viewer/icons.js";
 import { metres, place as placeText, sentence } from "viewer/words.js";
@@ -9,10 +9,29 @@ const ANSWER_MS = 4000;
 const TOAST_MS = 6000;
 const NAMES = { pause: "Pause", resume: "Go on", skip: "Skip target", goto: "Send here" };
 
+/** Why each action would do nothing now; empty for those that may be asked for. */
+export function locks(frame, connected) {
+  const all = !connected ? "Not connected" : frame?.state === "ended" ? "The run has ended" : "";
+  const begun = frame?.goal ? "" : "No target: the mission has not begun, or is over";
+  const drives = frame?.drives === "companion" ? "" : "Only while the companion drives";
+  return {
+    pause: all, // never locked for another reason: whoever wants the rover to stop is not to be kept from it
+    resume: all || (frame?.paused ? "" : "Not paused here"),
+    skip: all || begun,
+    goto: all || begun || drives,
+  };
+}
+
+function lock(button, reason) {
+  button.disabled = reason !== "";
+  setAttribute(button, "title", reason || null);
+}
+
 export class Actions {
   /** `link` holds the functions send(message) and askToken(). */
   constructor(bar, stage, model, view, link) {
     Object.assign(this, { bar, stage, model, view, send: link.send, aiming: false, aim: null, confirmed: null });
+    this.byAction = {};
     this.toast = make(
       "div",
       { class: "toast", role: "status", hidden: true },
@@ -46,10 +65,13 @@ export class Actions {
   }
 
   button(action, sign, onclick) {
-    return make("button", { type: "button", class: "wide", onclick }, icon(sign), make("span", {}, NAMES[action]));
+    const parts = [icon(sign), make("span", {}, NAMES[action])];
+    const made = make("button", { type: "button", class: "wide", onclick }, ...parts);
+    this.byAction[action] = made;
+    return made;
   }
 
-  /** Shows the buttons where acting is allowed, and locks them while nobody would hear. */
+  /** Shows the buttons where acting is allowed, and locks those that would do nothing now, with the reason. */
   show(scene, connected) {
     const allowed = scene?.may_act === true;
     const shown = allowed ? "all" : scene?.takes_actions === true ? "offer" : "none";
@@ -58,10 +80,13 @@ export class Actions {
       const parts = { all: [this.toast, this.confirm, this.buttons], offer: [this.offer], none: [] };
       this.bar.replaceChildren(...parts[shown]);
     }
+    const reasons = locks(this.model.frame, connected);
     // What is asked is of the moment when it was asked.
     const goal = this.model.frame?.goal?.name;
-    if (!this.confirm.hidden && (!allowed || goal !== this.asked)) this.endAim();
-    for (const button of [...this.buttons.children, this.yes]) button.disabled = !connected;
+    const locked = locks(this.model.frame, true)[this.asks];
+    if (!this.confirm.hidden && (!allowed || goal !== this.asked || locked)) this.endAim();
+    for (const [action, button] of Object.entries(this.byAction)) lock(button, reasons[action]);
+    this.yes.disabled = !connected;
   }
 
   act(action, place) {
@@ -105,6 +130,7 @@ export class Actions {
       return;
     }
     this.aiming = true;
+    this.asks = "goto";
     this.asked = this.model.frame?.goal?.name;
     this.toast.hidden = true;
     this.goto.setAttribute("aria-pressed", "true");
@@ -136,10 +162,7 @@ export class Actions {
   askSkip() {
     this.endAim();
     const goal = this.model.frame?.goal?.name;
-    if (!goal) {
-      this.say("error", "Skip target: the rover heads for none");
-      return;
-    }
+    this.asks = "skip";
     this.asked = goal;
     this.toast.hidden = true;
     this.ask(`Leave out ${goal}?`, "Skip", () => {

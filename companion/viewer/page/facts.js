@@ -7,24 +7,32 @@ const OLD_HEARTBEAT_S = 3;
 const LOST_HEARTBEAT_S = 6;
 const SLOW_HZ = 1;
 const LOW_PERCENT = 20;
+const ROLLS_M_S = 0.05;
 
 /** Facts that say nothing any more when it is not known where the rover is. */
 export const OF_PLACE = new Set(["Goal", "Setpoint", "Position"]);
 
 /** The three large numbers: [name, value, unit]. */
 export function readouts(frame) {
-  const goal = frame?.goal;
-  const rest = wayLeft(frame);
-  const far = Number.isFinite(rest) ? rest : distance(frame?.pose, goal?.place);
+  const speed = Math.abs(frame?.speed ?? NaN);
   return [
-    ["speed", number(Math.abs(frame?.speed ?? NaN)), "m/s"],
-    [
-      Number.isFinite(rest) ? "to go" : "to goal",
-      goal ? metres(far).replace(/ .*/, "") : UNKNOWN,
-      goal ? (far >= 9999.5 ? "km" : "m") : "",
-    ],
+    // A run may end while the rover still rolls.
+    [frame?.state === "ended" && speed >= ROLLS_M_S ? "last speed" : "speed", number(speed), "m/s"],
+    howFar(frame),
     ["mode", frame?.mode ?? UNKNOWN, ""],
   ];
+}
+
+// To the goal; of a simulator, which knows none, how far the rover has come.
+function howFar(frame) {
+  if (Number.isFinite(frame?.driven_m)) return ["driven", ...inMetres(frame.driven_m)];
+  const rest = wayLeft(frame);
+  if (Number.isFinite(rest)) return ["along path", ...inMetres(rest)];
+  return frame?.goal ? ["straight", ...inMetres(distance(frame.pose, frame.goal.place))] : ["to goal", UNKNOWN, ""];
+}
+
+function inMetres(far) {
+  return [metres(far).replace(/ .*/, ""), far >= 9999.5 ? "km" : "m"];
 }
 
 /** Rows of [name, value, level]; the level is null, "warning" or "error". */
@@ -68,8 +76,8 @@ export function trueFacts(frame) {
 }
 
 function packetsOf(link) {
-  const out = `${number(link.out, 0)}/s out`;
-  return link.heard ? `${number(link.in, 0)}/s in, ${out}` : `nobody heard, ${out}`;
+  const out = `${number(link.out, 0)} sent a second`;
+  return link.heard ? `${number(link.in, 0)} heard, ${out}` : `nobody heard, ${out}`;
 }
 
 /** Farther than five metres it is not looked for. */

@@ -97,6 +97,7 @@ export class MapView {
     if (frame?.path) places.push(...outermost(frame.path));
     if (scene?.home) places.push(scene.home);
     places.push(...outermost((scene?.targets ?? []).map((target) => target.place)));
+    for (const border of scene?.borders ?? []) places.push(...outermost(border.corners));
     places.push(...(track.bounds() ?? []), ...map.bounds());
     for (const more of this.besides) places.push(...more());
     if (map.shape && (scene?.truth || places.length < 2)) {

@@ -29,7 +29,7 @@ export class Panel {
       make("div", { class: "readouts" }, ...this.numbers.map((each) => each.node)),
       // What is new is seen without scrolling, however many targets there are.
       make("section", { class: "news-section" }, make("h2", {}, "News"), this.news.node),
-      make("section", { class: "targets-section" }, this.targetsHead, this.asked, this.targets),
+      (this.targetsSection = make("section", { class: "targets-section" }, this.targetsHead, this.asked, this.targets)),
       make("section", { class: "facts-section" }, make("h2", {}, "Facts"), this.facts),
     );
   }
@@ -77,14 +77,17 @@ export class Panel {
       setAttribute(row.node, "data-kind", now ? "now" : kindOf(status));
       setIcon(row.sign, now ? "now" : ({ skipped: "skip" }[kindOf(status)] ?? kindOf(status)));
       const ahead = frame?.state === "driving" ? "going there" : "next";
-      setText(row.status, now ? ahead : ended && status === "pending" ? "not reached" : status);
+      const missed = ended && status === "pending" ? "not reached" : status;
+      setText(row.status, now ? ahead : scene.truth ? "" : missed); // a simulator does not know what became of them
       setText(row.far, frame?.pose && status === "pending" ? metres(distance(frame.pose, target.place)) : "");
     });
     const known = `Targets, ${reached} of ${scene?.targets?.length} reached`;
     const first = frame?.goal?.asked === true && !ended;
     this.asked.hidden = !first;
     setText(this.asked, first ? `First, as asked: ${frame.goal.name}` : "");
-    setText(this.targetsHead, targets.length ? known : unplaced(frame?.statuses?.length ?? 0));
+    this.targetsSection.hidden = scene?.truth === true && !targets.length;
+    const head = scene?.truth ? "Targets of the mission" : known;
+    setText(this.targetsHead, targets.length ? head : unplaced(frame?.statuses?.length ?? 0));
   }
 
   buildTargets(targets, key) {

@@ -54,12 +54,15 @@ export function buildShell(root, camera) {
 }
 
 /** Keeps the map's own marks clear of what covers its edges. */
-export function watchEdges({ bar, buttons }, view) {
+export function watchEdges({ bar, buttons, legend }, view) {
   const measure = () => {
     // Only what stays: a map that moves for each message would be hard to read.
     view.camera.covered = bar.childElementCount ? bar.lastElementChild.offsetHeight + BAR_MARGIN_PX : 0;
     buttons.style.bottom = `${view.camera.covered}px`;
-    view.camera.coveredRight = buttons.offsetWidth + 12;
+    legend.node.style.maxHeight = `calc(100% - ${view.camera.covered + 24}px)`;
+    // Their box may be wider than its columns, which stand at its right edge.
+    const left = Math.min(...[...buttons.children].map((button) => button.offsetLeft));
+    view.camera.coveredRight = buttons.offsetWidth - left + 12;
     view.invalidate();
   };
   const observer = new ResizeObserver(measure);

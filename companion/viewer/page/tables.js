@@ -6,6 +6,8 @@ import { make } from "viewer/dom.js";
 const NUMBER = /^([-−+]?\d[\d.,\s]*%?( \([-−+±]\d[\d.]*\))?|[-–]|)$/;
 /** A word that is wider than a column should be. */
 const LONG = /\S{19}/;
+/** The same of a heading: beside each other there are several records. */
+const LONG_NAME = /[^\s-]{11}/;
 
 /** All tables, then what the run was made with. */
 export function buildTables(record) {
@@ -36,6 +38,7 @@ function table(head, rows) {
   const numeric = head.map((_, i) => rows.every((row) => NUMBER.test(String(row[i] ?? "–"))));
   const shown = (value) => (value === "-" ? "–" : String(value ?? "–"));
   const kind = (value, i) => (numeric[i] ? "right" : LONG.test(String(value)) ? "long" : null);
+  const headed = (name, i) => [numeric[i] && "right", LONG_NAME.test(name) && "long"].filter(Boolean).join(" ") || null;
   const cell = (value, i) => make("td", { class: kind(value, i) }, shown(value));
   return make(
     "div",
@@ -46,7 +49,7 @@ function table(head, rows) {
       make(
         "thead",
         {},
-        make("tr", {}, ...head.map((name, i) => make("th", { class: numeric[i] ? "right" : null }, name))),
+        make("tr", {}, ...head.map((name, i) => make("th", { class: headed(name, i) }, name))),
       ),
       make("tbody", {}, ...rows.map((row) => make("tr", {}, ...row.map(cell)))),
     ),

@@ -76,20 +76,20 @@ def headline_of(companion: Companion, status: Status) -> Headline:
     """In one line what is done, or why the rover stands and what it waits for; in the end, what it came to."""
     doing = doing_of(companion, status)
     left = _left_m(companion, status) if status.activity.phase is RunPhase.DRIVING else None
-    to_go = "" if left is None else f", {left:.0f} m to go"
+    far = "" if left is None else f", {left:.0f} m straight"
     why = f", {doing['why']}" if doing["why"] else ""
     is_over = doing["state"] == "ended" and not doing["why"]
     came_to = f", {status.targets_reached} of {status.targets} targets reached" if is_over else ""
-    return Headline(f"{doing['line']}{to_go}{why}{came_to}", MOODS.get(doing["state"], Mood.PLAIN))
+    return Headline(f"{doing['line']}{far}{why}{came_to}", MOODS.get(doing["state"], Mood.PLAIN))
 
 
 def mission_section(companion: Companion, status: Status) -> Section:
     """Target and last decision."""
     decision, left = status.decision, _left_m(companion, status)
-    to_go = "" if left is None else f", {left:.0f} m"
+    far = "" if left is None else f", {left:.0f} m straight"
     searches = len(companion.driver.searcher.seconds) if companion.driver else 0
     facts = (
-        Fact("target", f"{status.target or '-'}{to_go}"),
+        Fact("target", f"{status.target or '-'}{far}"),
         Fact("reached", f"{status.targets_reached} of {status.targets}"),
         Fact("part", f"{decision.part.value}, {PARTS[decision.part]}" if decision else "-"),
         Fact("why", decision.reason if decision else "-"),

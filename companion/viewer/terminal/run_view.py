@@ -27,7 +27,7 @@ from companion.viewer.terminal.sketch import Disc, Place, PlaceState, Sketch, co
 
 TRACK_STEP_M, TRACK_POINTS = 0.2, 5_000
 NEWS_KEPT = 50
-HEARTBEAT_OLD_S = 3.0
+HEARTBEAT_OLD_S, POSITION_OLD_S = 3.0, 1.5
 
 
 class RunView:
@@ -97,10 +97,12 @@ class RunView:
         companion, pose = self._companion, self._pose
         vehicle, mode = companion.vehicle, mode_of(companion.vehicle, companion.mission_run)
         armed = "armed" if mode["armed"] else "disarmed"
+        rates = self._arrivals.at(vehicle, status.time_s)
+        mute = _old(rates["heartbeat_age_s"], HEARTBEAT_OLD_S)
         facts = [
-            Fact("mode", f"{mode['mode']}, {armed}" if mode["mode"] else "-"),
-            Fact("driven by", mode["drives"]),
-            Fact("speed", f"{vehicle.forward_m_s:.2f} m/s"),
+            Fact("mode", f"{mode['mode']}, {armed}{mute}" if mode["mode"] else "-", alarm=bool(mute)),
+            Fact("driven by", f"{mode['drives']}{mute}", alarm=bool(mute)),
+            self._speed(_old(rates["position_age_s"], POSITION_OLD_S)),
         ]
         if pose is not None:
             word, degrees = compass_word(pose.heading_rad), math.degrees(pose.heading_rad) % 360.0
@@ -114,6 +116,12 @@ class RunView:
             facts.append(Fact("GPS", f"{vehicle.gps.fix.text}, {vehicle.gps.satellites} satellites", minor=True))
         return Section("Rover", tuple(facts))
 
+    def _speed(self, old: str) -> Fact:
+        vehicle = self._companion.vehicle
+        if vehicle.position is None:
+            return Fact("speed", "-")
+        return Fact("speed", f"{vehicle.forward_m_s:.2f} m/s{old}", alarm=bool(old))
+
     def _link_section(self, status: Status) -> Section:
         rates = self._arrivals.at(self._companion.vehicle, status.time_s)
         age_s = rates["heartbeat_age_s"]
@@ -125,6 +133,11 @@ class RunView:
             Fact("latency", f"{1e3 * self._companion.vehicle.latency_s:.0f} ms", minor=True),
         ]
         return Section("Link", tuple(facts))
+
+
+def _old(age_s: float | None, limit_s: float) -> str:
+    """What is written behind a value that was true some time ago; empty for a fresh one."""
+    return "" if age_s is None or age_s <= limit_s else f", {age_s:.0f} s ago"
 
 
 def _place(point: NedPoint) -> tuple[float, float]:

@@ -76,13 +76,13 @@ def test_a_companion_that_falls_silent_says_what_it_waits_for(tmp_path: Path) ->
     assert len(permitted.notices.told) == 1, "once"
 
 
-def test_a_pause_that_was_asked_for_is_told_as_one(tmp_path: Path) -> None:
+def test_a_pause_that_was_asked_for_was_told_then_and_is_not_told_again(tmp_path: Path) -> None:
     permitted = Permitted(tmp_path)
     permitted.verdict()
     permitted.stand(0.0, 0.0, mode=HOLD)
     permitted.run.paused = True
     assert permitted.verdict() is Reaction.SILENT
-    assert permitted.notices.texts == ["Companion silent: paused on request"]
+    assert permitted.notices.texts == []
     activity = permitted.run.activity
     assert activity.needs_person and str(activity) == (
         "stopped: paused on request, waiting for a person to ask it to go on, or to set GUIDED"

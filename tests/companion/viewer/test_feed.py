@@ -28,7 +28,7 @@ NEAR_M = 8.0
 KEYS = {
     "kind", "t", "pose", "speed", "turn", "mode", "armed", "drives", "line", "why", "state", "statuses", "goal", "path",
     "motion", "setpoint", "rays", "movers", "figures", "battery", "gps", "decision", "guard", "news", "rates",
-    "contacts", "touched",
+    "contacts", "touched", "paused",
 }  # fmt: skip
 
 
@@ -102,6 +102,19 @@ def test_a_whole_drive_is_told_and_is_no_other_for_it() -> None:
     now = cell_classes(evidence, 0, 0, columns, rows)
     assert (seen[:rows, :columns] != now).mean() < 0.001, "all but what the last tick brought"
     assert heard.scenes[-1]["map"]["columns"] == columns and heard.scenes[-1]["targets"]
+
+
+@pytest.mark.parametrize("why", ["", "nobody is here"])
+@pytest.mark.usefixtures("every_tick")
+def test_a_run_that_no_person_stopped_does_not_say_so(why: str) -> None:
+    run, heard = new_drive("points"), Heard()
+    watched = ViewerFeed(run.companion, heard, {})
+    watched.ended_by = why
+    run.companion.stop()
+    run.run(watched.show, 0.05)
+    watched.show(run.take_status())
+    last, how = heard.frames[-1], f"ended, {why}" if why else "stopped by the user"
+    assert (last["state"], last["line"]) == ("ended", f"{how}: 0 of 1 targets reached")
 
 
 @pytest.mark.usefixtures("every_tick")

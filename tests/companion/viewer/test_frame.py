@@ -16,7 +16,7 @@ from companion.core.frames import NedPoint
 from companion.core.scan import RangeScan
 from companion.executive.mission_progress import TargetStatus
 from companion.mission.bounds import Bound
-from companion.navigation.field_step import Part
+from companion.navigation.field_step import Action
 from companion.safety.mode_latch import Control
 from companion.safety.reasons import Activity, Doubt, EndReason, LatchReason, PowerReason, Reason, RunPhase, WaitReason
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
@@ -88,6 +88,7 @@ DOUBTED = Activity(RunPhase.STOPPED, Reason(Doubt.POSITION_WANDERS))
 DONE, BY_USER = (Activity(RunPhase.ENDED, Reason(kind)) for kind in (EndReason.DONE, EndReason.STOPPED_BY_USER))
 LOW = Reason(PowerReason.LOW, ("battery",))
 ROLLS, PILOT = {"forward_m_s": 1.0}, {"mode": RoverMode.MANUAL}
+RESTARTED = {"restarted": True, "armed": False}
 SHED = {"shed": TargetStatus.UNREACHABLE}
 
 
@@ -95,32 +96,48 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
     ("activity", "given", "line", "why"),
     [
         (DRIVING, {}, "driving to gate", ""),
-        (DRIVING, {"part": Part.RETURN}, "driving to gate", "going back to find another way"),
+        (DRIVING, {"action": Action.BACKTRACK}, "going back to find another way to gate", ""),
         (DRIVING, {"makes_way": True}, "driving to gate", "making way for something that moves"),
-        (DRIVING, {"part": Part.RETURN, "broken_off": LOW}, "driving to gate", "battery low for the autopilot"),
+        (DRIVING, {"broken_off": LOW}, "driving to gate", "battery low for the autopilot"),
         (WAITING, {}, "waiting for arming", "asked for; the autopilot says if it refuses"),
         (HELD, {}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
         (BLINDED, {}, "stopped: range data silent for over 1 s", "waiting for good data and a person to set X"),
+        (
+            HELD,
+            RESTARTED,
+            "stopped: autopilot restarted, rover disarmed",
+            "waiting for a person to set X",
+        ),
+        (HELD, {**RESTARTED, "armed": True}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
         (HELD, PILOT, "the pilot drives (MANUAL)", "waiting for a person to set X"),
         (DOUBTED, {}, "stopped: position wanders", ""),
         (DOUBTED, ROLLS, "stopping: position wanders", ""),
         (DONE, {}, "done", ""),
         (DONE, SHED, "ended: 1 of 2 targets reached", "shed: unreachable"),
+        (
+            DONE,
+            {**SHED, "broken_off": LOW},
+            "ended early, battery low for the autopilot: 1 of 2 targets reached",
+            "shed: unreachable",
+        ),
         (BY_USER, {"shed": TargetStatus.PENDING}, "stopped by the user: 1 of 2 targets reached", "shed: not reached"),
     ],
 )
 def test_the_line_says_what_the_rover_does_and_why_it_stands(
     activity: Activity, given: dict[str, Any], line: str, why: str
 ) -> None:
-    heartbeat = SimpleNamespace(mode=given.get("mode", RoverMode.HOLD), armed=True)
-    vehicle = SimpleNamespace(heartbeat=heartbeat, is_ours=False, forward_m_s=given.get("forward_m_s", 0.0))
+    heartbeat = SimpleNamespace(mode=given.get("mode", RoverMode.HOLD), armed=given.get("armed", True))
+    vehicle = SimpleNamespace(
+        heartbeat=heartbeat, is_ours=False, forward_m_s=given.get("forward_m_s", 0.0),
+        restarted=given.get("restarted", False),
+    )  # fmt: skip
     run = SimpleNamespace(stop=SimpleNamespace(reason=activity.reason), latch=SimpleNamespace(control=Control.PERSON))
     statuses = [("gate", TargetStatus.REACHED), *((name, given[name]) for name in ("shed",) if name in given)]
     companion = SimpleNamespace(
         outcome=SimpleNamespace(broken_off=given.get("broken_off")), mission_run=run, vehicle=vehicle,
         statuses=lambda: statuses, executor=SimpleNamespace(driver=SimpleNamespace(makes_way=given.get("makes_way"))),
     )  # fmt: skip
-    decision = SimpleNamespace(part=given.get("part", Part.EXPLORE))
+    decision = SimpleNamespace(action=given.get("action", Action.FOLLOW))
     status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=decision)
     doing = doing_of(cast(Any, companion), cast(Any, status))
     assert (doing["line"], doing["why"]) == (line, why)

@@ -94,21 +94,22 @@ tell([panel.targetsHead.textContent, texts(panel.targets).at(-1), rows.length, t
     assert len(current) == 1 and "151" in current[0]
 
 
-def test_all_on_the_map_shows_the_last_target_and_other_records(tmp_path: Path) -> None:
+def test_all_on_the_map_shows_the_last_target_fences_and_other_records(tmp_path: Path) -> None:
     script = """
 const { MapView } = await import("./map_view.js");
 const { Others } = await import("./overlays.js");
 const targets = Array.from({ length: 1000 }, (_, i) => ({ name: "", place: [i, -i] }));
+const borders = [{ corners: [[-90, 0], [1500, 0], [0, 1]] }];
 const path = Array.from({ length: 1000 }, (_, i) => [0, 2 * i]);
 const others = new Others([{ name: "b", track: [[0, -50, 0], [1, -70, 0]], elsewhere: false }], 0, () => {});
 const model = {
-  scene: { targets, home: [0, 0] }, frame: { path }, track: { bounds: () => null }, map: { bounds: () => [] },
+  scene: { targets, borders, home: [0, 0] }, frame: { path }, track: { bounds: () => null }, map: { bounds: () => [] },
 };
 const places = MapView.prototype.interest.call({ model, besides: [() => others.places()] });
 const [norths, easts] = [0, 1].map((axis) => places.map((place) => place[axis]));
 tell([Math.min(...norths), Math.max(...norths), Math.min(...easts), Math.max(...easts)]);
 """
-    assert ran(tmp_path, DOCUMENT + script) == [-70, 999, -999, 1998]
+    assert ran(tmp_path, DOCUMENT + script) == [-90, 1500, -999, 1998]
 
 
 def test_before_the_autopilot_is_heard_the_page_says_what_it_waits_for(tmp_path: Path) -> None:
@@ -168,8 +169,56 @@ const moments = [
 tell(moments.map((one) => (headline.show({ live: true }, { ...frame, ...one }, "", true), headline.why.textContent)));
 """
     turning, driving = ["Turning to 052°", "Turning to 045°", "Turning left"], ["0.8 m/s", "0.0 m/s"]
-    whole = [f"{one} · 12.0 m away" for one in turning] + [f"12.0 m away · {one}" for one in driving]
+    whole = [f"{one} · 12.0 m straight" for one in turning] + [f"12.0 m straight · {one}" for one in driving]
     assert ran(tmp_path, DOCUMENT + script) == whole
+
+
+def test_a_button_that_would_do_nothing_is_locked_and_says_why(tmp_path: Path) -> None:
+    script = """
+const { locks } = await import("./actions.js");
+const drives = { state: "driving", drives: "companion", goal: { name: "X" }, paused: false };
+tell([
+  [drives, true], [drives, false], [{ ...drives, state: "ended" }, true], [{ ...drives, goal: null }, true],
+  [{ ...drives, drives: "nobody", paused: true }, true], [null, true],
+].map((one) => locks(...one)));
+"""
+    driving, lost, ended, without, paused, nothing = ran(tmp_path, DOCUMENT + script)
+    assert driving == {"pause": "", "resume": "Not paused here", "skip": "", "goto": ""}
+    assert set(lost.values()) == {"Not connected"} and set(ended.values()) == {"The run has ended"}
+    assert without["skip"] == without["goto"] != "" and without["pause"] == ""
+    assert paused == {"pause": "", "resume": "", "skip": "", "goto": "Only while the companion drives"}
+    assert nothing["pause"] == "" and all(nothing[name] for name in ("resume", "skip", "goto"))
+
+
+def test_distances_and_the_last_speed_are_named_for_what_they_are(tmp_path: Path) -> None:
+    script = """
+const { readouts } = await import("./facts.js");
+const frame = { pose: [0, 0, 0], goal: { name: "X", place: [0, 12] }, path: [], speed: 0.4, state: "driving" };
+const path = [[0, 0], [5, 0], [5, 12], [0, 12]];
+const moments = [
+  {}, { path }, { state: "ended" }, { state: "ended", speed: -0.02 }, { goal: null }, { goal: null, driven_m: 88.34 },
+];
+tell(moments.map((one) => readouts({ ...frame, ...one }).slice(0, 2).map((each) => each.join(" "))));
+"""
+    straight, along, rolls, stands, without, simulator = ran(tmp_path, DOCUMENT + script)
+    assert straight == ["speed 0.4 m/s", "straight 12.0 m"] and along[1] == "along path 22.0 m"
+    assert (without[1], simulator[1]) == ("to goal – ", "driven 88.3 m")
+    assert (rolls[0], stands[0]) == ("last speed 0.4 m/s", "speed 0.0 m/s")
+
+
+def test_a_simulator_lists_the_targets_of_the_mission_without_saying_what_became_of_them(tmp_path: Path) -> None:
+    script = """
+const { Panel } = await import("./panel.js");
+const shown = [[{ name: "gate", place: [0, 3] }], []].map((targets) => {
+  const scene = { truth: true, targets };
+  const panel = new Panel({ scene, frame: { statuses: [], pose: [0, 0, 0] }, news: [], newsCount: 0 }, {});
+  panel.showTargets();
+  return [panel.targetsSection.hidden, panel.targetsHead.textContent, panel.targets.textContent];
+});
+tell(shown);
+"""
+    listed, none = ran(tmp_path, DOCUMENT + script)
+    assert listed == [False, "Targets of the mission", "1. gate3.0 m"] and none[0] is True
 
 
 def test_marks_that_would_cover_each_other_are_smaller(tmp_path: Path) -> None:

@@ -47,9 +47,11 @@ class Run:
 def looked_at(executor: object | None) -> tuple[list[str], int]:
     run: Any = Run(executor)
     said: list[str] = []
-    unattended = Unattended(run, said.append)
+    why: list[str] = []
+    unattended = Unattended(run, said.append, why.append)
     for time_s in (1.0, BEGINS_S - 1.0, BEGINS_S, BEGINS_S + 1.0):
         unattended.look(Status(time_s, Activity(RunPhase.WAITING, None, AWAITED), None, None, "", 0, 1, 0))
+    assert [line.partition("ended: ")[2] for line in said] == why
     return said, len(run.stops)
 
 

@@ -92,8 +92,8 @@ def test_after_a_reboot_the_destination_is_where_the_rover_goes_and_the_news_tel
             simulator.advance_to_s(simulator.time_s + 0.5)
             watching.note()
     told = [text.partition(" s: ")[2] for text in watching.events]
-    begun = ["mode GUIDED, was MANUAL", "armed"]
-    assert told == [*begun, "the autopilot has booted: MANUAL, disarmed", *begun]
+    begun = ["mode GUIDED now, MANUAL before", "the rover is armed now"]
+    assert told == [*begun, "the autopilot has started anew: MANUAL, disarmed", *begun]
 
 
 def test_rates_count_since_a_while_ago() -> None:

@@ -21,6 +21,7 @@ from tests.companion.viewer.test_feed import KEYS, Heard
 from tests.support.sitl_client import HOME, Client
 
 SIZE = 20
+TARGETS = [{"name": "gate", "place": [0.0, 15.0]}]
 START = SimStart(10.5, 2.5, np.pi / 2.0, HOME)
 
 
@@ -38,7 +39,7 @@ class Watched:
     def __init__(self, **options: Any) -> None:
         self.simulator = Simulator(the_world(), START, "lidar-360", noise=False, **options)
         self.page, self.said = Heard(), []
-        self.feed = WebFeed(self.simulator, self.page, "Yard", "connect to me", self.said.append)
+        self.feed = WebFeed(self.simulator, self.page, "Yard", "connect to me", self.said.append, TARGETS)
         self.log = EventLog(
             lambda line: None, lambda: self.simulator.time_s, lambda line: self.feed.tell(line, "error")
         )
@@ -82,7 +83,7 @@ def test_it_says_what_it_waits_for_and_what_it_does_until_it_touches_a_wall() ->
     silent = watched.run_to(watched.simulator.time_s + HEARD_S + 1.0)
     assert not silent["rates"]["links"][0]["heard"]
     news = [(one["level"], one["text"]) for frame in watched.page.frames for one in frame["news"]]
-    assert ("notice", "mode GUIDED, was MANUAL") in news and ("notice", "armed") in news
+    assert ("notice", "mode GUIDED now, MANUAL before") in news and ("notice", "the rover is armed now") in news
     assert next(text for level, text in news if level == "error").startswith("collision 1: the rover, driving ")
     assert watched.said == []
 
@@ -101,6 +102,7 @@ def test_the_map_is_the_world_as_it_is_now() -> None:
     watched = Watched()
     frame = watched.run_to(1.0)
     (scene,) = watched.page.scenes
+    assert scene["targets"] == TARGETS
     assert scene["truth"] is True and scene["map"]["west_m"] == -2.5 and scene["map"]["south_m"] == -10.5
     cells = watched.cells()
     assert (cells[:, 10] == SEEN_OBSTACLE).all() and cells[15, 3] == COSTLY and cells[0, 0] == FREE
