@@ -205,7 +205,10 @@ def weigh_roomy(log_odds, base, penalty, weights, window, occupied_at, radius_ce
     for fy in range(y0, y1):
         for fx in range(x0, x1):
             weights[fy, fx] = 1.0
-            if not near[(fy - y0) * s : (fy - y0 + 1) * s, (fx - x0) * s : (fx - x0 + 1) * s].all():
+    for y in range(near.shape[0]):
+        for x in range(near.shape[1]):
+            if not near[y, x]:
+                fy, fx = y0 + y // s, x0 + x // s
                 weights[fy, fx] = min(base[fy, fx] + penalty[fy, fx], 1.0)
 
 
@@ -245,26 +248,33 @@ def soften(weights, window, soft_reach, soft_cost, max_soft):
     low = max(0, y0 - n)
     right = min(width, x1 + n)
     high = min(height, y1 + n)
-    far = soft_reach + 1.0
-    gap = np.full((high - low + 2, right - left + 2), far)
+    gap = np.full((high - low + 2, right - left + 2), soft_reach + 1.0)
     for y in range(low, high):
         for x in range(left, right):
             if weights[y, x] >= 1.0:
                 gap[y - low + 1, x - left + 1] = 0.0
     for y in range(1, gap.shape[0] - 1):
+        _nearer(gap[y], gap[y - 1])
         for x in range(1, gap.shape[1] - 1):
-            near = min(min(gap[y, x - 1], gap[y - 1, x]) + 1.0, min(gap[y - 1, x - 1], gap[y - 1, x + 1]) + DIAGONAL)
-            gap[y, x] = min(gap[y, x], near)
+            gap[y, x] = min(gap[y, x], gap[y, x - 1] + 1.0)
     for y in range(gap.shape[0] - 2, 0, -1):
+        _nearer(gap[y], gap[y + 1])
         for x in range(gap.shape[1] - 2, 0, -1):
-            near = min(min(gap[y, x + 1], gap[y + 1, x]) + 1.0, min(gap[y + 1, x + 1], gap[y + 1, x - 1]) + DIAGONAL)
-            gap[y, x] = min(gap[y, x], near)
+            gap[y, x] = min(gap[y, x], gap[y, x + 1] + 1.0)
     for fy in range(y0, y1):
         for fx in range(x0, x1):
             nearest = gap[fy - low + 1, fx - left + 1]
             if weights[fy, fx] < 1.0 and nearest <= soft_reach:
                 extra = soft_cost * (1.0 - (nearest - 1.0) / soft_reach)
                 weights[fy, fx] = max(weights[fy, fx], min(weights[fy, fx] + extra, max_soft))
+
+
+@njit(cache=True, nogil=True)
+def _nearer(row, beside):
+    """Distances of a row from those of the one beside it. No step needs the one before: the compiler does several."""
+    own, left, middle, right = row[1:-1], beside[:-2], beside[1:-1], beside[2:]
+    for x in range(own.size):
+        own[x] = min(own[x], middle[x] + 1.0, min(left[x], right[x]) + DIAGONAL)
 
 
 @njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ from companion.settings import MappingSettings
 
 RAYS = 720
 AIM_MS, MOST_MS = 1.0, 3.0
-"""Missed where a wall 8 m all round flickers between fields of 0.15 m: they are all weighed anew."""
+"""A busy machine needs half as much again."""
 SIDE_M, RADIUS_M, REACH_M = 40.0, 0.35, 12.0
 MOTIONS = {"evidence_m": 0.1, "hit_depth_m": 0.02, "keeps": "outline"}
 KINDS = {"fields of 1 m": (1.0, {}), "fields of 0.15 m": (0.15, {}), "planned motions": (0.15, MOTIONS)}
