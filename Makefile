@@ -36,9 +36,10 @@ collect: $(TOOLS)
 pytest: $(TOOLS) $(ALL_KERNELS)
 	$(BIN)/python -m pytest -n 5 --dist worksteal
 
-# With the drives that show a little more and take long: every mission with every sensor suite, more seeds.
+# With the drives that show a little more and take long: every mission with every sensor suite, more seeds. Properties
+# are tried with all their examples.
 test-all: $(TOOLS) $(ALL_KERNELS)
-	$(BIN)/python -m pytest -n 5 --dist worksteal -m ""
+	ALL_EXAMPLES=1 $(BIN)/python -m pytest -n 5 --dist worksteal -m ""
 
 lint: $(TOOLS)
 	$(BIN)/ruff check .
@@ -51,7 +52,7 @@ bench: $(TOOLS) $(ALL_KERNELS)
 
 # Looks for inputs that break something: new ones every time, for SECONDS in all.
 fuzz: $(TOOLS) $(ALL_KERNELS)
-	$(BIN)/python -m tests.fuzz all properties --seconds $(SECONDS)
+	ALL_EXAMPLES=1 $(BIN)/python -m tests.fuzz all properties --seconds $(SECONDS)
 
 results: $(TOOLS)
 	$(BIN)/rover-sitl experiment kwasniewski-table1 --docs docs

@@ -10,12 +10,18 @@ from hypothesis import HealthCheck, settings
 from hypothesis.database import DirectoryBasedExampleDatabase
 
 from companion.cli import kernel_cache
+from tests.support.quick import examples
 
 kernel_cache.use_cache(os.environ)  # before a test imports numba
 
 # The same examples every time, on however busy a machine. ``make fuzz`` draws new ones, and tries finds again.
 settings.register_profile(
-    "fixed", derandomize=True, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    "fixed",
+    max_examples=examples(100),
+    derandomize=True,
+    database=None,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
 )
 settings.register_profile(
     "search",

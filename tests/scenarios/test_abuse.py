@@ -256,6 +256,7 @@ def test_range_data_at_a_thousand_a_second_is_not_mapped_so_often_and_parameters
     assert set(rig.companion.vehicle.parameters) <= PARAMETERS_KEPT
 
 
+@pytest.mark.thorough
 @first_of(
     1, ("flood", "hz"), [(lidar, 20), pytest.param(lidar, 40, marks=pytest.mark.thorough), (lidar, 1000), (beams, 1000)]
 )

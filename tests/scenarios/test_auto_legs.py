@@ -99,6 +99,7 @@ def assert_silent_since(rig: Asker, since_s: float) -> None:
     assert [one for one in rig.sent_since(since_s) if one.moves_or_changes] == []
 
 
+@pytest.mark.thorough
 @first_of(
     1,
     ("mode", "metres"),

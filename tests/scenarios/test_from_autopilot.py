@@ -182,6 +182,7 @@ def test_the_command_itself(tmp_path: Path) -> None:
         assert world.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_command_drives_what_auto_hands_over(tmp_path: Path) -> None:
     """Real processes: a person arms and sets AUTO, the companion drives the leg and ends by itself."""

@@ -226,7 +226,7 @@ def test_after_a_loss_of_power_it_arms_and_goes_on_where_it_was(tmp_path: Path) 
     )
 
 
-@pytest.mark.parametrize("alive", [True, False], ids=["before", "while it is dead"])
+@first_of(1, "alive", [True, False], ids=["before", "while it is dead"])
 @first_of(1, "mode", [MANUAL, pytest.param(HOLD, marks=pytest.mark.thorough)])
 def test_a_rover_that_a_person_has_taken_stays_with_that_person(tmp_path: Path, mode: int, alive: bool) -> None:
     rig, mission = rig_of(tmp_path)
@@ -252,6 +252,7 @@ def test_a_rover_that_a_person_has_taken_stays_with_that_person(tmp_path: Path, 
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 def test_a_rover_disarmed_by_a_person_is_not_armed_after_a_restart(tmp_path: Path) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(4.0)

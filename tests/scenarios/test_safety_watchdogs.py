@@ -301,6 +301,7 @@ def test_a_position_that_drifts_as_slowly_as_they_all_do_is_driven_by(rig: Rig) 
     assert not rig.was_stopped
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_companion_and_simulator_as_two_processes_a_lidar_stuck_for_a_while(tmp_path: Path) -> None:
     """Over TCP, in real time: it stops, says why, drives on, and arrives."""

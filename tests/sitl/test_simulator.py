@@ -13,6 +13,7 @@ from sitl.plant.closed_loop import NoiseSettings
 from sitl.simulator import Simulator
 from sitl.world.truth import SimStart
 from sitl.world.world import World
+from tests.support.quick import examples
 from tests.support.sitl_client import HOME, Client, open_ground, ready
 
 
@@ -103,6 +104,7 @@ def test_local_position_begins_at_zero_wherever_the_rover_stands() -> None:
     assert (here.lat / 1e7 - HOME.lat_deg) * 111_318.8 == pytest.approx(told.x, abs=0.05)
 
 
+@pytest.mark.thorough
 def test_position_errors_wander_slowly_within_the_size_asked_for() -> None:
     simulator = open_ground(noise=NoiseSettings(position_bias_m=0.12), seed=5)
     client = Client(simulator)
@@ -229,7 +231,7 @@ def test_any_message_with_any_content_leaves_the_link_up(seed: int) -> None:
     assert math.isfinite(client.simulator.truth.north_m)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.binary(min_size=1, max_size=300), max_size=5))
 def test_noise_on_the_line_leaves_the_link_up(chunks: list[bytes]) -> None:
     client = Client(open_ground())

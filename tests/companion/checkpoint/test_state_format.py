@@ -18,9 +18,10 @@ from companion.checkpoint.state_format import (
     decode_state,
     encode_state,
 )
+from tests.support.quick import examples
 from tests.support.states import a_state, bands_of, forged, rasters_of, sealed, states
 
-QUICK = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+QUICK = settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 def written() -> bytes:

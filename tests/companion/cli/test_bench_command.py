@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 from companion.cli.commands import app
 
 
+@pytest.mark.thorough
 def test_the_command_writes_table_json_and_page(tmp_path):
     arguments = [
         "bench",

@@ -23,6 +23,7 @@ from companion.mission.bounds import Bounds
 from companion.perception.moving_obstacles import Moving
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
+from tests.support.quick import examples
 
 SETTINGS = Settings()
 ROVER = RoverLimits(0.35, 2.0, 8.0)
@@ -126,7 +127,7 @@ def test_it_backs_off_between_walls() -> None:
 @given(
     st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.0, 3.0)
 )  # fmt: skip
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 def test_room_is_what_is_left_at_the_nearest_moment(
     north_m: float, east_m: float, north_m_s: float, east_m_s: float, speed_m_s: float
 ) -> None:

@@ -29,6 +29,7 @@ from companion.mission.bounds import Bound, Bounds
 from companion.safety.reasons import SetpointFault
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+from tests.support.quick import examples
 
 SIDE = 20
 MIDDLE = 0.5 * SIDE
@@ -210,7 +211,7 @@ def grounds(draw) -> EvidenceMap:
 BODIES = st.sampled_from((LONG, Footprint.rectangle(0.9, 0.7, 0.2), Footprint.circle(0.4)))
 
 
-@runs(max_examples=150, deadline=None)
+@runs(max_examples=examples(150), deadline=None)
 @given(grounds(), BODIES, st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.floats(0.0, 2.0))
 def test_what_passes_is_free_under_the_outline_in_shapes(
     evidence: EvidenceMap, body: Footprint, forward_m_s: float, turn_rad_s: float, speed_m_s: float
@@ -260,7 +261,7 @@ def test_its_way_is_as_long_as_physics_makes_it(lasts_s: float) -> None:
     assert ways[0][-1, 0] - MIDDLE == pytest.approx(wanted_m, abs=0.06)
 
 
-@runs(max_examples=200, deadline=None)
+@runs(max_examples=examples(200), deadline=None)
 @given(
     st.lists(st.tuples(st.floats(-1.0, 2.0), st.floats(-1.5, 1.5)), max_size=10),
     st.tuples(st.floats(-1.0, 2.0), st.floats(-1.5, 1.5)),

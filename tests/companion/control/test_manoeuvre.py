@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from companion.control.manoeuvre import ArcSegment, Manoeuvre, Try, find_manoeuvre, tries
 from companion.core.frames import Pose
 from tests.companion.control.test_arc_controller import MIDDLE, RADIUS_M, ROVER, SETTINGS, ground, path, view
+from tests.support.quick import examples
 
 
 def curvature_per_m(segment: ArcSegment) -> float:
@@ -34,7 +35,7 @@ def is_joined(manoeuvre: Manoeuvre, start: Pose) -> bool:
 places = st.floats(-7.0, 7.0)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(
     st.floats(-3.2, 3.2),
     st.lists(st.tuples(places, places), max_size=12),

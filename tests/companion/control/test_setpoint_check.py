@@ -29,6 +29,7 @@ from companion.safety.reasons import Reason, SetpointFault
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
 from tests.support.notices import Notices
+from tests.support.quick import examples
 from tests.support.rig import Rig, yard
 from tests.support.stored import KEEP_IN, POLYGONS, box, stored
 
@@ -123,7 +124,7 @@ def gap_m(places: np.ndarray, north_m: float, east_m: float) -> float:
     return float(np.hypot(places[:, 0] - north_m, places[:, 1] - east_m).min()) if len(places) else math.inf
 
 
-@runs(max_examples=400, deadline=None)
+@runs(max_examples=examples(400), deadline=None)
 @given(grounds(), POSITIONS)
 def test_a_position_that_passes_is_near_and_the_way_there_clear_and_seen(evidence: EvidenceMap, output: Output) -> None:
     assert isinstance(output.setpoint, GuidedPosition)
@@ -144,7 +145,7 @@ def test_a_position_that_passes_is_near_and_the_way_there_clear_and_seen(evidenc
             assert gap_m(unseen, north_m, east_m) > 0.5 * evidence.evidence_m - 0.06
 
 
-@runs(max_examples=400, deadline=None)
+@runs(max_examples=examples(400), deadline=None)
 @given(grounds(), VELOCITIES)
 def test_a_velocity_that_passes_can_be_stopped_on_its_arc(evidence: EvidenceMap, output: Output) -> None:
     assert isinstance(output.setpoint, GuidedVelocity)
@@ -165,7 +166,7 @@ def test_a_velocity_that_passes_can_be_stopped_on_its_arc(evidence: EvidenceMap,
 CELLS = st.sets(st.tuples(st.integers(0, SIDE - 1), st.integers(0, SIDE - 1)), max_size=60)
 
 
-@runs(max_examples=400, deadline=None)
+@runs(max_examples=examples(400), deadline=None)
 @given(grounds(), CELLS, POSITIONS)
 def test_backing_out_asks_for_nothing_that_is_refused(
     evidence: EvidenceMap, closed: set[tuple[int, int]], output: Output
@@ -183,7 +184,7 @@ def test_on_open_ground_it_backs_out_as_fast_as_it_may() -> None:
     assert back_m_s == SETTINGS.guidance.back_out_speed_m_s
 
 
-@runs(max_examples=200, deadline=None)
+@runs(max_examples=examples(200), deadline=None)
 @given(POSITIONS)
 def test_on_open_ground_that_was_seen_only_distance_and_the_edge_of_the_map_count(output: Output) -> None:
     assert isinstance(output.setpoint, GuidedPosition)
@@ -388,7 +389,7 @@ def inner(side_m: float) -> Bound:
     return Bound("the yard", square, True, RADIUS_M, RADIUS_M)
 
 
-@runs(max_examples=400, deadline=None)
+@runs(max_examples=examples(400), deadline=None)
 @given(st.one_of(POSITIONS, VELOCITIES), st.floats(5.0, 12.0))
 def test_what_passes_keeps_the_rovers_middle_inside_its_borders(output: Output, side_m: float) -> None:
     bound = inner(side_m)

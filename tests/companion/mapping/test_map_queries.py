@@ -22,6 +22,7 @@ from companion.mapping.map_queries import (
     unseen_beside,
 )
 from companion.settings import MappingSettings
+from tests.support.quick import examples
 
 SIDE = 16
 RADIUS_M = 0.35
@@ -112,7 +113,7 @@ def test_the_nearest_unseen_place_beside_a_line_is_found_on_either_side(corner: 
 # --- arcs ------------------------------------------------------------------------------------------------------------
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(st.floats(-0.6, 0.6), st.floats(-3.1, 3.1), st.sampled_from(CORNERS))
 def test_an_arc_ends_at_what_stands_on_it(curvature_per_m: float, course_rad: float, corner: NedPoint) -> None:
     evidence = seen_map(corner)

@@ -16,6 +16,7 @@ from companion.core.frames import NedPoint
 from companion.core.grid import OBSTACLE, Grid
 from companion.mapping.map_files import MapError, load_map
 from companion.mapping.turned_map import turned
+from tests.support.quick import examples
 from tests.support.shared_data import SHARED
 
 CORNER = NedPoint(3.0, -2.0)
@@ -47,7 +48,7 @@ def test_a_quarter_turn_moves_every_field_to_exactly_one(quarters: int) -> None:
     assert np.array_equal(grid.weights, np.rot90(weights, -quarters))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(yaw_rad=st.floats(-7.0, 7.0), seed=st.integers(0, 1000), size=st.tuples(st.integers(1, 9), st.integers(1, 9)))
 def test_no_obstacle_is_lost_and_none_is_far_from_one(yaw_rad: float, seed: int, size: tuple[int, int]) -> None:
     weights = a_map(*size, seed)

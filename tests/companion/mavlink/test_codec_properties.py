@@ -15,6 +15,7 @@ from companion.vehicle.commands import GuidedPosition, GuidedVelocity, StatusTex
 from companion.vehicle.events import LocalPositionSeen, RangeSeen
 from companion.vehicle.state import VehicleState, fold
 from tests.support.mavlink_vehicle import Station
+from tests.support.quick import examples
 from tests.support.tlog import messages
 
 MESSAGE_IDS = [0, 1, 22, 30, 32, 33, 47, 49, 77, 87, 132, 173, 193, 242, 253, 330]
@@ -47,7 +48,7 @@ def test_any_bytes_are_survived(pieces: list[bytes]) -> None:
 
 
 @given(st.lists(st.tuples(st.sampled_from(MESSAGE_IDS), st.binary(min_size=1, max_size=167)), max_size=8))
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 def test_any_contents_are_survived(packets: list[tuple[int, bytes]]) -> None:
     codec = listening()
     state = VehicleState()

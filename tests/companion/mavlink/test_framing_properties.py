@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from companion.mavlink.framing import Framer
 from tests.support.mavlink_vehicle import Station
+from tests.support.quick import examples
 
 PACKETS = [Station().heartbeat(), Station().local_position(5), Station(1, 191).heartbeat()]
 PIECES = st.lists(
@@ -26,7 +27,7 @@ PIECES = st.lists(
 
 
 @given(PIECES, st.integers(1, 40))
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 def test_no_byte_is_counted_twice_and_it_goes_on_listening(pieces: list[bytes], size: int) -> None:
     data = b"".join(pieces) + b"\0" * 600  # so that every beginning has its end
     framer, found = Framer(), []

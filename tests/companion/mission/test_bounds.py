@@ -22,6 +22,7 @@ from companion.mission.bounds import Bound, Bounds, autopilot_bounds
 from companion.mission.items import Item, ItemError
 from companion.mission.mission import Area, GridSpec, HomePoint, Mission, MissionError, RoverSpec, Target
 from companion.mission.resolve import ResolvedMission, resolve
+from tests.support.quick import examples
 
 HOME = GeoPoint(-35.3632613, 149.1652299)
 FRAME = LocalFrame(HOME)
@@ -219,7 +220,7 @@ def test_no_borders_no_faults() -> None:
 Coordinate = st.floats(-30.0, 30.0).map(lambda metres: round(metres, 6))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(
     corners=st.lists(st.tuples(Coordinate, Coordinate), min_size=3, max_size=7, unique=True),
     start=st.tuples(st.floats(-30.0, 30.0), st.floats(-30.0, 30.0)),

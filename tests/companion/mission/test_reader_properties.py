@@ -15,6 +15,7 @@ from companion.mapping.map_files import MapError, load_map, save_ros_map
 from companion.mission.load import load_mission
 from companion.mission.mission import GridSpec, HomePoint, Mission, MissionError, Target
 from companion.mission.resolve import resolve
+from tests.support.quick import examples
 
 MISSIONS = Path(__file__).resolve().parents[3] / "missions"
 metres = st.floats(-1e5, 1e5)
@@ -22,7 +23,7 @@ masks = arrays.arrays(np.bool_, arrays.array_shapes(min_dims=2, max_dims=2, max_
 
 
 @given(masks, st.floats(0.001, 100.0), metres, metres, st.booleans())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 def test_a_saved_map_loads_as_it_was(
     blocked: np.ndarray, resolution_m: float, north_m: float, east_m: float, all_known: bool
 ) -> None:
@@ -38,7 +39,7 @@ def test_a_saved_map_loads_as_it_was(
     st.tuples(st.integers(0, 40), st.integers(0, 40)), st.floats(0.05, 20.0), metres, metres,
     st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), min_size=1, max_size=5),
 )  # fmt: skip
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 def test_fields_come_back_as_the_same_fields(
     home: tuple[int, int], resolution_m: float, north_m: float, east_m: float, fields: list[tuple[int, int]]
 ) -> None:
@@ -93,7 +94,7 @@ HEADS = [
 
 
 @given(st.sampled_from(NAMES), st.sampled_from(HEADS), st.binary(max_size=200))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_nonsense(name: str, head: bytes, data: bytes) -> None:
     assert_fine_or_one_line(name, head + data)
 
@@ -111,7 +112,7 @@ edits = st.lists(st.tuples(st.floats(0.0, 1.0), st.integers(0, 6), st.binary(max
 
 
 @given(st.sampled_from(NAMES), edits)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_damaged_files(name: str, changes: list[tuple[float, int, bytes]]) -> None:
     data = SEEDS[name]
     for where, cut, put in changes:
@@ -128,7 +129,7 @@ json_values = st.recursive(
 
 
 @given(st.data(), json_values)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_plans_with_one_value_replaced(data: st.DataObject, value: object) -> None:
     plan = json.loads(SEEDS["m.plan"])
     places: list[tuple[object, object]] = []

@@ -12,6 +12,7 @@ from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import PLANNERS, make_planner
 from companion.settings import PlannerSettings
 from tests.support.paths import is_path
+from tests.support.quick import examples
 
 BUDGET = Budget(min_epochs=2, max_epochs=15, control_points=(4, 6), population=18)
 SETTINGS = PlannerSettings.model_validate({"sedighi": {"population": 20, "generations": 40}})
@@ -39,7 +40,7 @@ def problems(draw):
 
 @pytest.mark.parametrize("name", PLANNERS)
 @given(problem=problems(), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=120, deadline=None)  # enough for planted faults of one condition in one kernel
+@settings(max_examples=examples(120), deadline=None)  # enough for planted faults of one condition in one kernel
 def test_contract(name, problem, seed):
     planner = make_planner(name, SETTINGS)
     assert planner.name == name
@@ -47,7 +48,7 @@ def test_contract(name, problem, seed):
 
 
 @given(problem=problems(), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 def test_nothing_is_cheaper_than_an_optimal_planner(problem, seed):
     results = {
         name: make_planner(name, SETTINGS).plan(problem, BUDGET, np.random.default_rng(seed)) for name in PLANNERS

@@ -13,6 +13,7 @@ from companion.planning.registry import make_planner
 from companion.planning.smoothing import curve_cost, smooth, straightened, taut
 from companion.settings import PlannerSettings
 from tests.support.planning_maps import drawn, one_obstacle
+from tests.support.quick import examples
 
 
 def shortest(problem: PlanningProblem):
@@ -42,7 +43,7 @@ def grounds(draw):
 
 
 @given(grounds())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_the_curve_is_a_path_between_the_same_ends_and_hardly_dearer(problem):
     cells = shortest(problem)
     if cells is None:
@@ -55,7 +56,7 @@ def test_the_curve_is_a_path_between_the_same_ends_and_hardly_dearer(problem):
 
 
 @given(grounds())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_pulled_straight_it_keeps_to_fields_of_the_path_and_costs_no_more(problem):
     cells = shortest(problem)
     if cells is None:
@@ -91,7 +92,7 @@ def test_without_room_a_corner_stays():
 
 
 @given(grounds())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_taut_corners_see_each_other(problem):
     cells = shortest(problem)
     if cells is None:

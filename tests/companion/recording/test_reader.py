@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from companion.recording.reader import RecordedTick, load_record
 from companion.recording.record_format import CHECKED_TICK, RecordError
+from tests.support.quick import examples
 from tests.support.records import (
     TICKS,
     Change,
@@ -136,7 +137,7 @@ def test_damage_is_found_in_a_record_that_was_never_closed(copy: Path, name: str
         read(copy)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_record_that_is_cut_anywhere_is_read_as_far_as_it_goes(
     record: Path, tmp_path: Path, data: st.DataObject

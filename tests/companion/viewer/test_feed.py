@@ -117,6 +117,7 @@ def test_a_run_that_no_person_stopped_does_not_say_so(why: str) -> None:
     assert (last["state"], last["line"]) == ("ended", f"{how}: 0 of 1 targets reached")
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("every_tick")
 def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_new_one_everything() -> None:
     run, heard = new_drive("points"), Heard()

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl.autopilot.fence import inside, outside
 from sitl.autopilot.mission_items import Item
 from tests.support.mission_client import FENCE, at, do, heard, in_auto, place_m, run_until, upload
+from tests.support.quick import examples
 from tests.support.sitl_client import Client, open_ground, ready
 
 ACCEPTED, FAILED = 0, 4
@@ -178,7 +179,7 @@ def test_either_of_two_areas_is_enough_when_wanted() -> None:
 corner = st.tuples(st.integers(-1000, 1000), st.integers(-1000, 1000))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(st.lists(corner, min_size=3, max_size=8, unique=True), corner)
 def test_inside_is_what_shapely_says(corners: list[tuple[int, int]], place: tuple[int, int]) -> None:
     polygon = shapely.Polygon(corners)

@@ -17,7 +17,7 @@ from sitl.autopilot.commands import HANDLERS as COMMANDS
 from sitl.autopilot.framing import Framer, packet_size
 from sitl.simulator import Simulator
 from tests.support.party import Party
-from tests.support.quick import first_of
+from tests.support.quick import examples, first_of
 from tests.support.sitl_client import open_ground
 
 GUIDED, RETURN, REPOSITION = 15, 20, 192
@@ -106,7 +106,7 @@ def handled() -> list[Any]:
 # Bytes that are no packets
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(
     pieces=st.lists(st.binary(max_size=600) | st.sampled_from([b"\xfd\xff", b"\xfe\xff", b"\xfd\x00\x02"]), max_size=6)
 )
@@ -141,7 +141,7 @@ def valid(data: bytes) -> bool:
     return any(m.get_msgId() >= 0 for m in mav.parse_buffer(data) or [])
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(data=st.data())
 def test_damaged_commands_are_not_obeyed(driving: Driving, data: st.DataObject) -> None:
     packet = bytearray(data.draw(st.sampled_from(COMMAND_PACKETS)))
@@ -257,7 +257,7 @@ def test_parameters_take_numbers_only(driving: Driving) -> None:
     assert driving.state() == before
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 4))])
+@first_of(1, "seed", range(4))
 def test_edges_of_all_fields_of_everything_it_takes_in(seed: int) -> None:
     """Commands may well be obeyed here; the vehicle stays up, wherever it is sent and however it is tuned."""
     rng = np.random.default_rng(seed)

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.mission_items import KEPT, NAMES, Item, RefusedError, mission_item
 from tests.support.mission_client import FENCE, MISSION, RALLY, at, do, download, heard, home, in_auto, item, upload
+from tests.support.quick import examples
 from tests.support.sitl_client import Client, open_ground, ready
 
 ACCEPTED, ERROR, BAD_FRAME, UNSUPPORTED, NO_SPACE, BAD_SEQUENCE, DENIED, CANCELLED = 0, 1, 2, 3, 4, 13, 14, 15
@@ -343,7 +344,7 @@ def test_whatever_mission_is_kept_can_be_run(items: list) -> None:
 single = st.floats(width=32, allow_nan=False, allow_infinity=False, min_value=-1e5, max_value=1e5)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(
     st.sampled_from(sorted(KEPT)), st.sampled_from([0, 3, 6, 10]), st.tuples(single, single, single, single),
     st.integers(-900_000_000, 900_000_000), st.integers(-1_800_000_000, 1_800_000_000), single,

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from sitl.autopilot.mode_smart_rtl import simplified, without_loops
 from tests.support.mission_client import FENCE, RALLY, at, place_m, run_until, upload
+from tests.support.quick import examples
 from tests.support.sitl_client import Client, open_ground, ready
 
 ACCEPTED, FAILED = 0, 4
@@ -140,7 +141,7 @@ def away_m(point: tuple[float, float], path: list[tuple[float, float]]) -> float
     return best
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(points, st.floats(0.5, 5.0))
 def test_a_simplified_path_stays_near_and_keeps_its_ends(path: list[tuple[float, float]], tolerance_m: float) -> None:
     short = simplified(path, tolerance_m)
@@ -149,7 +150,7 @@ def test_a_simplified_path_stays_near_and_keeps_its_ends(path: list[tuple[float,
     assert all(away_m(point, short) <= tolerance_m + 0.5 for point in path)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(points, st.floats(0.5, 5.0))
 def test_a_path_without_loops_is_no_longer_and_keeps_its_ends(path: list[tuple[float, float]], near_m: float) -> None:
     def length_m(some: list[tuple[float, float]]) -> float:

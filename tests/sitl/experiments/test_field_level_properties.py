@@ -15,6 +15,7 @@ from companion.planning.problem import Budget, PlanningProblem, PlanStatus
 from companion.settings import Settings
 from sitl.experiments.field_level import Outcome, drive_fields
 from tests.support.paths import is_path
+from tests.support.quick import examples
 
 PLACES = st.tuples(st.integers(0, 13), st.integers(0, 10)).map(lambda place: Cell(*place))
 
@@ -29,7 +30,7 @@ def worlds(draw):
     return Grid(weights), start, target
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(world=worlds(), seed=st.integers(0, 1000))
 def test_the_target_is_reached_if_and_only_if_there_is_a_way(world, seed):
     truth, start, target = world

@@ -18,6 +18,7 @@ from sitl.faults.plan import Fault, GpsGlitch, LinkEffect, LinkFault, PilotTakes
 from sitl.faults.tables import KINDS
 from sitl.scenario import ScenarioError, scenario_from_mission, with_faults
 from sitl.sensors.range_sensors import Defect
+from tests.support.quick import examples
 
 ROOT = Path(__file__).resolve().parents[3]
 SHIPPED = sorted((ROOT / "missions" / "faults").glob("*.toml"))
@@ -152,7 +153,7 @@ def test_a_file_that_is_no_plan_gets_one_line(content: bytes | None, tmp_path: P
     assert re.fullmatch(rf"{re.escape(str(path))}: .+; .+", str(caught.value))
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 @given(text=st.text(max_size=100))
 def test_any_text_is_read_or_refused(text: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     path = tmp_path_factory.getbasetemp() / "any.toml"

@@ -20,7 +20,7 @@ from sitl.sensors.range_sensors import SUITES
 from sitl.world.truth import SimStart
 from sitl.world.world import World
 from tests.support.firmware import Firmware, frame
-from tests.support.quick import first_of
+from tests.support.quick import examples, first_of
 
 START = SimStart(15.0, 15.0, 0.3, GeoPoint(53.1325, 23.1688))
 FASTEST_M_S = 5.0
@@ -118,7 +118,7 @@ rest = st.sampled_from([38, 70]).flatmap(lambda n: st.binary(min_size=n, max_siz
 exact = st.tuples(st.sampled_from([b"\x1a\x48", b"\x81\x73"]), rest).map(b"".join)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(datagrams=st.lists(st.one_of(st.binary(max_size=100), headed, exact), max_size=10))
 def test_any_bytes_leave_it_up_and_only_frames_move_it(datagrams: list[bytes]) -> None:
     behind = physics(0.0, 1.0, walls=True)
@@ -145,7 +145,7 @@ damaged = st.tuples(st.integers(0, len(beat) - 1), st.integers(1, 255)).map(
 )
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(pieces=st.lists(st.one_of(st.binary(max_size=50), damaged, st.just(beat[:5])), max_size=10))
 def test_any_bytes_on_the_lidars_line_leave_it_its_name(pieces: list[bytes]) -> None:
     port = ScannerPort()

@@ -14,6 +14,7 @@ from sitl.plant.rover import GRAVITY_M_S2, drive, new_rover
 from sitl.simulator import Simulator
 from sitl.world.truth import SimStart
 from sitl.world.world import TOP_SPEED_M_S, Ground, World
+from tests.support.quick import examples
 from tests.support.sitl_client import HOME, ready
 
 STEP_S = 0.005
@@ -58,7 +59,7 @@ def test_pulling_away_takes_as_long_as_friction_needs() -> None:
     assert rover[0].speed_m_s == pytest.approx(0.1 * GRAVITY_M_S2, rel=0.01)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(
     st.floats(0.02, 0.99),
     st.floats(-3.0, 3.0),

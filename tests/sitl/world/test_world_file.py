@@ -19,6 +19,7 @@ from sitl.cli.commands import app
 from sitl.scenario import ScenarioError, scenario_from_mission
 from sitl.world.world import TOP_SPEED_M_S, World
 from sitl.world.world_file import WorldTable, _Drawing, ground_grid, load_world
+from tests.support.quick import examples
 from tests.support.rays import ray_m
 
 SIZE = "size_m = [20.0, 15.0]\n"
@@ -301,7 +302,7 @@ NUMBERS = st.sampled_from(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(changes=st.lists(st.tuples(st.integers(0, 60), NUMBERS), min_size=1, max_size=3))
 def test_whatever_numbers_stand_in_it_a_world_is_understood_or_refused(
     changes: list[tuple[int, str]], tmp_path_factory: pytest.TempPathFactory

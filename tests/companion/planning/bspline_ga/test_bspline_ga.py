@@ -23,6 +23,7 @@ from companion.planning.random_numbers import seeded
 from companion.planning.raster import first_fault, polyline
 from companion.settings import PlannerSettings
 from tests.support.planning_maps import drawn, one_obstacle
+from tests.support.quick import examples
 
 VLN = 100_000.0
 TUNING = Tuning(*tuning_of(PlannerSettings(span_way_points=0, obstacle_value=VLN)))
@@ -95,7 +96,7 @@ def test_stopping_at_a_limit_hides_nothing_below_it(genes, seed, limit):
     assert stopped == whole if whole < limit else stopped >= limit
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=examples(300))
 @given(genes_strategy, st.integers(0, 20), st.sampled_from([0.02, 0.3]), st.booleans())
 def test_fitness_is_below_vln_exactly_for_correct_paths(genes, seed, share, corner_cutting):
     weights = cluttered(seed, share)
@@ -278,7 +279,7 @@ def test_paths_keep_off_soft_cost_where_there_is_room():
     assert soft_share(40) >= 10.0
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(st.integers(0, 10_000), st.sampled_from([0.5, 1.5, 3.5]))
 def test_a_glance_at_a_large_map_rejects_only_what_the_whole_sum_would(seed, obstacles):
     rng = np.random.default_rng(seed)

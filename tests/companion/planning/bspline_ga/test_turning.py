@@ -14,6 +14,7 @@ from companion.planning.bspline_ga.turning import greatest_curvature_per_field
 from companion.planning.problem import Budget, KinematicConstraints, PlanningProblem
 from companion.settings import PlannerSettings
 from tests.support.planning_maps import one_obstacle
+from tests.support.quick import examples
 
 BUDGET = Budget(1, 300, (4, 5, 6, 8), 60)
 FINE = 20_000
@@ -37,7 +38,7 @@ def greatest_curvature(line):
     return float(np.abs(np.diff(headings) / (0.5 * (lengths[1:] + lengths[:-1]))).max())
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=examples(100))
 @given(st.lists(st.tuples(st.integers(0, 60), st.integers(0, 60)), min_size=3, max_size=7))
 def test_the_sharpest_curvature_is_that_of_a_fine_line(points):
     control = np.array(points, float)

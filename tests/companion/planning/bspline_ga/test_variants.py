@@ -12,6 +12,7 @@ from companion.planning.problem import KinematicConstraints, PlanStatus, path_co
 from companion.planning.raster import first_fault, plain
 from companion.settings import PlannerSettings
 from tests.companion.planning.test_planner_contract import BUDGET, problems
+from tests.support.quick import examples
 
 VARIANTS = {
     "adaptive": {"adaptive": True},
@@ -26,7 +27,7 @@ any_kinematics = st.builds(
 
 @pytest.mark.parametrize("name", VARIANTS)
 @given(problem=problems(), kinematics=any_kinematics, seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=examples(120), deadline=None)
 def test_contract(name, problem, kinematics, seed):
     planner = BsplineGa(PlannerSettings(**VARIANTS[name]))
     problem = replace(problem, kinematics=kinematics)

@@ -19,6 +19,7 @@ from companion.planning.raster import cells_cost, polyline
 from companion.settings import PlannerSettings
 from tests.support.paths import is_path
 from tests.support.planning_maps import drawn, one_obstacle
+from tests.support.quick import examples
 
 SETTINGS = PlannerSettings()
 
@@ -59,7 +60,7 @@ def assert_as_cheap(found, best):
 
 
 @given(world=worlds())
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=examples(400), deadline=None)
 def test_astar_is_as_cheap_as_dijkstra(world):
     rng, weights, corner_cutting = world
     problem = PlanningProblem(weights, some_cell(rng, weights), some_cell(rng, weights), corner_cutting)
@@ -82,7 +83,7 @@ def test_astars_equally_short_ways_have_few_bends():
 
 
 @given(worlds(), st.integers(8, 40), st.integers(0, 6))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_the_path_is_a_cheapest_one_however_little_room_the_queue_begins_with(world, room, blocks):
     rng, weights, corner_cutting = world
     for _ in range(blocks):  # even ground with blocks of other ground in it is where most steps are left out
@@ -129,7 +130,7 @@ def drive(planner, seed, steps=12):
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_dstar_lite_stays_as_cheap_as_dijkstra_on_a_map_that_changes(seed):
     for problem, result in drive(DstarLite(SETTINGS), seed):
         assert_as_cheap(result, plan(Dijkstra(SETTINGS), problem))
@@ -181,7 +182,7 @@ def cost_of_line(weights, x0, y0, x1, y1, corner_cutting):
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4), st.booleans())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_the_cost_of_a_line_is_that_of_its_fields(seed, blocks, corner_cutting):
     rng = np.random.default_rng(seed)
     weights = ground("even", rng, *rng.integers(2, 90, 2), 0.0)
@@ -200,7 +201,7 @@ def test_the_cost_of_a_line_is_that_of_its_fields(seed, blocks, corner_cutting):
 
 
 @given(world=worlds())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_theta_stars_curve_is_free_and_no_longer_than_its_fields(world):
     rng, weights, corner_cutting = world
     problem = PlanningProblem(weights, some_cell(rng, weights), some_cell(rng, weights), corner_cutting)

@@ -22,6 +22,7 @@ from sitl.experiments.achour_environments import FIELDS_A_METRE, OBSTACLES, envi
 from tests.support.chance import more_than
 from tests.support.paths import is_path
 from tests.support.planning_maps import drawn, one_obstacle
+from tests.support.quick import examples
 
 SEEDS = 200
 AS_PRINTED = AchourSettings(unit_fields=FIELDS_A_METRE, shorten=False)
@@ -64,7 +65,7 @@ coordinates = st.tuples(st.integers(-60, 60), st.integers(-60, 60))
 
 
 @given(node=coordinates, final=coordinates, target=coordinates, unit_fields=st.sampled_from([0.5, 1.0, 10.0]))
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=examples(500), deadline=None)
 def test_no_segment_is_fitter_than_the_one_that_ends_at_the_target(node, final, target, unit_fields):
     if node in (target, final):
         return
@@ -81,7 +82,7 @@ def test_the_fittest_is_chosen_and_a_tie_goes_to_the_target():
 
 
 @given(seed=st.integers(0, 2**32 - 1), most=st.integers(1, 8))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_the_first_population_is_the_nearest_samples_in_sight(seed, most):
     rng = np.random.default_rng(seed)
     weights = np.where(rng.random((15, 15)) < 0.15, 1.0, 0.5)
@@ -125,7 +126,7 @@ def test_offspring_that_are_not_born(blocked, walk, born):
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 9))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_every_segment_is_crossed_and_every_offspring_is_in_sight(seed, count):
     rng = np.random.default_rng(seed)
     finals, walk = np.zeros((2 * count + 2, 2), np.int64), np.array([(0, 0)])
@@ -139,7 +140,7 @@ def test_every_segment_is_crossed_and_every_offspring_is_in_sight(seed, count):
 
 
 @given(seed=st.integers(0, 2**32 - 1), share=st.sampled_from([0.0, 0.1, 0.3]), corner_cutting=st.booleans())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_a_walk_is_a_chain_of_free_lines(seed, share, corner_cutting):
     rng = np.random.default_rng(seed)
     weights = np.where(rng.random((20, 30)) < share, 1.0, 0.5)

@@ -11,6 +11,7 @@ from companion.planning.random_numbers import seeded
 from companion.planning.raster import first_fault, polyline
 from tests.support.chance import usual_counts
 from tests.support.planning_maps import drawn
+from tests.support.quick import examples
 
 
 @st.composite
@@ -25,7 +26,7 @@ def lines(draw):
 
 
 @given(made=lines())
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=examples(500), deadline=None)
 def test_what_is_in_sight_can_be_driven_to(made):
     weights, ends, corner_cutting = made
     drivable = first_fault(weights, polyline(np.array(ends)), corner_cutting)[0] == 0
@@ -67,7 +68,7 @@ def test_where_hardly_anything_is_free_there_are_fewer_samples():
 
 
 @given(seed=st.integers(0, 2**32 - 1), corner_cutting=st.booleans())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_a_path_pulled_straight_stays_one_and_gets_no_longer(seed, corner_cutting):
     rng = np.random.default_rng(seed)
     weights = np.where(rng.random((12, 12)) < 0.15, 1.0, 0.5)

@@ -10,6 +10,7 @@ from companion.core.grid import BASE_WEIGHT, inflated
 from companion.planning.papers.polygons import polygons_of, rectangles, without_notches
 from companion.planning.raster import first_fault, plain, polyline
 from tests.support.planning_maps import drawn
+from tests.support.quick import examples
 
 
 @st.composite
@@ -22,7 +23,7 @@ def maps(draw):
 
 
 @given(weights=maps())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 def test_rectangles_cover_the_obstacles_once(weights):
     times = np.zeros(weights.shape, int)
     for x0, y0, x1, y1 in rectangles(weights):
@@ -31,7 +32,7 @@ def test_rectangles_cover_the_obstacles_once(weights):
 
 
 @given(weights=maps())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 def test_an_obstacle_is_what_touches_even_at_corners(weights):
     polygons = polygons_of(weights, 0.5)
     regions, count = label(weights >= 1.0, np.ones((3, 3)))
@@ -41,7 +42,7 @@ def test_an_obstacle_is_what_touches_even_at_corners(weights):
 
 
 @given(weights=maps())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 def test_corners_are_on_free_ground_beside_their_obstacle(weights):
     polygons = polygons_of(weights, 0.5)
     padded = np.pad(polygons.owner, 2)

@@ -19,7 +19,7 @@ from companion.settings.planners import PrmSettings
 from sitl.experiments.achour_environments import OBSTACLES, environments
 from tests.support.chance import more_than, usual_counts
 from tests.support.planning_maps import drawn
-from tests.support.quick import first_of
+from tests.support.quick import examples, first_of
 
 SEEDS = 200
 
@@ -66,7 +66,7 @@ def roadmaps(draw):
 
 @pytest.mark.thorough
 @given(made=roadmaps())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_lazy_a_star_finds_the_shortest_way_along_lines_in_sight(made):
     """networkx, told beforehand of every line, knows no shorter one."""
     import networkx as nx  # large; only the worker that runs this test loads it
@@ -146,7 +146,7 @@ def test_without_blocked_lines_extra_samples_lie_anywhere():
 
 
 @given(seed=st.integers(0, 2**32 - 1), share=st.sampled_from([0.0, 0.1, 0.3]), corner_cutting=st.booleans())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_a_query_is_a_chain_of_free_lines(seed, share, corner_cutting):
     rng = np.random.default_rng(seed)
     weights = np.where(rng.random((20, 30)) < share, 1.0, 0.5)

@@ -31,7 +31,7 @@ from sitl.experiments.monotone_reach import COLUMNS, ROWS, fewest_switches
 from sitl.experiments.sedighi_spaces import crossing, given_spaces, own_spaces
 from tests.support.chance import more_than, usual_counts
 from tests.support.planning_maps import drawn
-from tests.support.quick import first_of
+from tests.support.quick import examples, first_of
 from tests.support.shared_data import SHARED, needs_shared
 
 SEEDS = 200
@@ -73,7 +73,7 @@ def walk(corners):
 
 
 @given(made=populations())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_a_path_measures_what_walking_it_field_by_field_does(made):
     weights, square, population = made
     measures = np.empty((5, 3), np.int64)
@@ -90,7 +90,7 @@ def test_a_path_measures_what_walking_it_field_by_field_does(made):
 
 
 @given(made=populations())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_vertices_stand_in_the_row_or_column_of_their_gene(made):
     _, square, population = made
     genes = population.locations.shape[1]
@@ -140,7 +140,7 @@ def test_from_corner_to_corner_of_a_square_the_search_space_is_the_map():
     sides=st.tuples(st.integers(1, 30), st.integers(1, 30)),
     share=st.tuples(*[st.floats(0, 1, exclude_max=True)] * 4),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 def test_any_rectangle_and_any_ends_have_a_search_space(sides, share):
     width, height = sides
     start = (int(share[0] * width), int(share[1] * height))
@@ -226,6 +226,7 @@ def test_a_forerunner_keeps_its_restriction():
     assert (after.modes == (0, 9, 9)).all()
 
 
+@pytest.mark.thorough
 @first_of(
     1,
     ("name", "percent"),

@@ -14,6 +14,7 @@ from companion.planning.papers.wang_moving_obstacles import (
     place,
 )
 from companion.planning.problem import ObstacleTrajectory
+from tests.support.quick import examples
 
 NUMBERS = st.floats(-20.0, 20.0)
 
@@ -42,7 +43,7 @@ def test_place_before_between_and_behind_the_rows(time_s, expected):
     radius=st.floats(0.5, 5.0),
     begin_s=st.floats(0.0, 4.0),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 def test_first_meeting_agrees_with_small_steps(points, robot, radius, begin_s):
     track = np.array(points)
     track[:, 0] = np.cumsum(track[:, 0])

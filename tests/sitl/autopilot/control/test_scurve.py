@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sitl.autopilot.control.scurve import DONE, LENGTH, SPEED, START_SPEED, along, leg_times, ramp, ramp_s, top_speed
+from tests.support.quick import examples
 
 STEP_S = 0.02
 ACCEL, JERK = st.floats(0.2, 5.0), st.floats(0.2, 20.0)
@@ -38,7 +39,7 @@ def test_a_leg_from_rest_to_rest(length_m: float, wish: float, accel: float, jer
     assert before == (length_m, 0.0, 0.0)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.floats(0.0, 5.0), st.floats(0.1, 5.0), st.floats(0.0, 300.0), st.floats(0.0, 50.0), ACCEL, JERK)
 def test_a_leg_begun_in_motion(
     start: float, wish: float, length_m: float, done_m: float, accel: float, jerk: float
@@ -58,7 +59,7 @@ def test_a_leg_begun_in_motion(
     assert math.isclose(places[-1], length_m + done_m, abs_tol=1e-3)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.floats(0.01, 5.0), ACCEL, JERK)
 def test_a_change_of_speed_is_complete_after_its_time(change: float, accel: float, jerk: float) -> None:
     total_s = ramp_s(change, accel, jerk)
