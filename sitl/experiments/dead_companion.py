@@ -7,9 +7,14 @@ autopilot.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+import pickle
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from functools import partial
+from typing import ClassVar, cast
 
 import numpy as np
 from rich.table import Table
@@ -108,16 +113,26 @@ def overheard(mission: Mission, seed: int, settings: Settings | None = None, sce
     return Told(mission, scenario, led_by, seed, tuple(words), began_s, report.sim_time_s)
 
 
-def die(told: Told, time_s: float) -> Death:
-    """The same drive, but nothing more is said from a moment on. The simulator does the same on hearing the same."""
+def die(told: Told, moments_s: Sequence[float]) -> list[Death]:
+    """The same drive, but nothing more is said from a moment on; one death for each moment.
+
+    The simulator does the same on hearing the same, so it hears all once: at each moment a copy of the process, a fork,
+    goes on without a companion.
+    """
     simulator = told.scenario.simulator(told.seed)
-    link = simulator.connect(name="companion")
-    for until_s, said in told.words:
-        if until_s > time_s:
-            break
-        link.receive(said)
-        simulator.advance_to_s(until_s)
-        link.take()
+    link, words, deaths = simulator.connect(name="companion"), deque(told.words), dict[float, Death]()
+    for moment_s in sorted(moments_s):
+        while words and words[0][0] <= moment_s:
+            until_s, said = words.popleft()
+            link.receive(said)
+            simulator.advance_to_s(until_s)
+            link.take()
+        deaths[moment_s] = _in_a_copy(partial(_death, told, moment_s, simulator))
+    return [deaths[moment_s] for moment_s in moments_s]
+
+
+def _death(told: Told, time_s: float, simulator: Simulator) -> Death:
+    """What happens from now on, with nobody who says anything."""
     speed_m_s, since_m = abs(simulator.truth.speed_m_s), simulator.driven_m
     before = len(simulator.collisions)
     went_s = watch_until_it_stands(simulator)
@@ -135,6 +150,25 @@ def die(told: Told, time_s: float) -> Death:
         simulator.driven_m - since_m,
         went_s,
     )
+
+
+def _in_a_copy(work: Callable[[], Death]) -> Death:
+    """What ``work`` gives in a copy of this process; nothing changes here. Raises EOFError if the copy has failed."""
+    read, write = os.pipe()
+    with warnings.catch_warnings():
+        # Python warns of forks beside other threads: these hold no lock that a simulator takes.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        pid = os.fork()
+    if not pid:
+        try:
+            os.write(write, pickle.dumps(work()))
+        finally:
+            os._exit(0)
+    os.close(write)
+    with open(read, "rb") as answer:
+        data = answer.read()
+    os.waitpid(pid, 0)
+    return cast(Death, pickle.loads(data))
 
 
 def watch_until_it_stands(simulator: Simulator) -> float:
@@ -272,7 +306,7 @@ def deaths_of(
     settings = parse_settings({"guidance": {"controller": controller}}, NAME)
     told = overheard(mission, seed, settings, scenario)
     moments_s = np.random.default_rng((seed, count)).uniform(told.begin_s, told.end_s, count)
-    return [die(told, float(moment_s)) for moment_s in moments_s]
+    return die(told, moments_s.tolist())
 
 
 def with_suite(mission: Mission, suite: str) -> Mission:

@@ -25,7 +25,7 @@ MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 def test_whenever_it_dies_nothing_is_touched(name: str, suite: str) -> None:
     told = overheard(with_suite(load_mission(MISSIONS / name), suite), 0)
     moments_s = np.random.default_rng(0).uniform(told.begin_s, told.end_s, 6)
-    deaths = [die(told, float(moment_s)) for moment_s in moments_s]
+    deaths = die(told, moments_s.tolist())
     assert sum(death.speed_m_s > 0.1 for death in deaths) >= 2, "some while it drove"
     assert [death for death in deaths if death.touched] == []
     assert max(death.went_s for death in deaths) < 30.0
@@ -35,7 +35,8 @@ def test_whenever_it_dies_nothing_is_touched(name: str, suite: str) -> None:
 @pytest.mark.thorough
 def test_what_is_heard_again_is_the_same_drive() -> None:
     told = overheard(with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "lidar-360"), 3)
-    early, late = die(told, told.begin_s - 1.0), die(told, told.end_s + 1.0)
+    late, early = die(told, [told.end_s + 1.0, told.begin_s - 1.0])
+    assert late == die(told, [late.time_s])[0], "one death does not depend on those before it"
     assert (early.speed_m_s, early.went_m) == (0.0, 0.0)
     assert late.went_m < 0.5 and late.speed_m_s < 1.0, "at its end the rover stops"
     assert told.end_s - told.begin_s > 40.0

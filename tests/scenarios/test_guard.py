@@ -49,7 +49,7 @@ def test_with_a_guard_a_dead_companions_rover_stands_soon_and_touches_nothing(gu
     """Left alone for 0.3 s and braking at 1 m/s², from 2 m/s: 3 m at most; without a guard it is 8.4 m."""
     told = overheard(guarded, 0, PLANNED)
     moments_s = np.random.default_rng(1).uniform(told.begin_s + 3.0, told.end_s - 3.0, 2)
-    deaths = [die(told, float(moment_s)) for moment_s in moments_s]
+    deaths = die(told, moments_s.tolist())
     assert max(death.speed_m_s for death in deaths) > 1.5
     assert [death for death in deaths if death.touched] == []
     assert max(death.went_m for death in deaths) < 3.0
