@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -36,6 +37,7 @@ class StateFiles:
         self._base = Settings()
         if named is not None and os.path.isfile(named):
             raise OutputError(f"{named}: is a file; --state takes a directory")
+        self._made = [] if named is None else [one for one in (named, *named.parents) if not one.exists()]
         if named is not None and not named.is_dir():
             with written(named):
                 named.mkdir(mode=0o700, parents=True)
@@ -61,8 +63,14 @@ class StateFiles:
         return Signer(load_key(key_file), saved=TimeFile(self._directory / SIGNING_TIME, self._saver))
 
     def close(self) -> str:
-        """Write what is left; returns why something could not be written, or an empty text."""
+        """Write what is left; returns why something could not be written, or an empty text.
+
+        Of a run that never began no empty directories stay.
+        """
         self._saver.close()
+        with contextlib.suppress(OSError):  # there is something in it
+            for made in self._made:
+                made.rmdir()
         return self._saver.problem
 
 

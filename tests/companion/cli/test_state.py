@@ -73,3 +73,12 @@ def test_a_mission_that_has_ended_is_told_and_not_driven_again(tmp_path: Path) -
 def test_a_folder_that_cannot_be_made_is_told_as_it_was_given() -> None:
     with pytest.raises(OutputError, match=r"^/proc/none: cannot be written: .*; choose another place$"):
         StateFiles(Path("/proc/none"))
+
+
+def test_of_a_run_that_never_began_no_empty_folders_stay(tmp_path: Path) -> None:
+    StateFiles(tmp_path / "rover" / "state").close()
+    assert list(tmp_path.iterdir()) == []
+    files = StateFiles(tmp_path / "rover" / "state")
+    (tmp_path / "rover" / "state" / "mission.state").touch()
+    files.close()
+    assert (tmp_path / "rover" / "state" / "mission.state").exists()
