@@ -224,6 +224,7 @@ OPENED_OTHERWISE = {
     "companion/storage/unbuffered.py": "/dev/null",
     "companion/cli/entry.py": "/dev/null",
     "companion/bench/measure.py": "/proc",
+    "sitl/experiments/dead_companion.py": "a pipe of its own",
     "sitl/experiments/soak.py": "/proc",
     "companion/cli/report.py": "a browser",
     "companion/viewer/report_csv.py": "written only",
