@@ -39,6 +39,8 @@ PIPE_BYTES = 16 * 1024
 """What waits in a pipe is seconds of moments before anybody notices that nothing is taken: not the usual 64 kB."""
 CLOSE_S = 1.5
 MOST_ACTIONS = 50
+MOST_LINE_BYTES = 10_000
+"""Of what a browser asks for, as the web process tells it."""
 NICE = 5
 """By so much the drive comes before the page, which others may keep busy."""
 NEEDED = ("starlette", "uvicorn", "websockets")
@@ -257,13 +259,23 @@ class WebProcess:
                     return
 
     def _hear(self, process: subprocess.Popen[bytes]) -> None:
-        """In a thread: what browsers ask for."""
+        """In a thread: what browsers ask for. A process that says anything else is ended, and another one begun."""
         assert process.stdout is not None
-        with contextlib.suppress(OSError, ValueError):
-            for line in process.stdout:
-                asked = json.loads(line)
-                if isinstance(asked, dict):
-                    self._asked.append(asked)
+        with contextlib.suppress(OSError, ValueError):  # its end
+            while line := process.stdout.readline(MOST_LINE_BYTES):
+                if (asked := _asked(line)) is None:
+                    process.kill()
+                    return
+                self._asked.append(asked)
+
+
+def _asked(line: bytes) -> Json | None:
+    """What a line asks for; None if it is none that the web process says."""
+    try:
+        asked = json.loads(line) if line.endswith(b"\n") else None
+    except (ValueError, RecursionError):
+        return None
+    return asked if isinstance(asked, dict) else None
 
 
 def _yield(process_id: int) -> None:

@@ -8,6 +8,7 @@ import json
 import os
 import signal
 import socket
+import sys
 import time
 import urllib.error
 import urllib.request
@@ -216,6 +217,28 @@ def test_a_process_that_hangs_is_ended_and_begun_anew(web: WebProcess, monkeypat
     with looking(web) as client:
         assert next_of(client, "scene")["mission"] == "yard"
     assert web.process_id != first and not psutil.pid_exists(first)
+
+
+@pytest.mark.parametrize("said", ["b'x' * 65536", "b'[' * 5000 + b'\\n'", "b'7\\n'"])
+def test_a_process_that_talks_nonsense_is_ended_and_another_one_begun(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str
+) -> None:
+    """Whatever has got into it: it neither fills the memory of the drive nor makes it deaf for good."""
+    mad = tmp_path / "python"
+    mad.write_text(f"#!{sys.executable}\nimport os\nwhile True: os.write(1, {said})\n")
+    mad.chmod(0o755)
+    sound = sys.executable
+    monkeypatch.setattr(sys, "executable", str(mad))
+    monkeypatch.setattr(web_process, "FIRST_WAIT_S", 0.01)
+    process = WebProcess(WebPlace("127.0.0.1", 0, TOKEN), takes_actions=True)
+    try:
+        wait_until(lambda: process.started > 0)
+        monkeypatch.setattr(sys, "executable", sound)
+        wait_until(lambda: process.put(wire.JSON, b"{}") and process.started > 1)
+        begin(process)
+        assert process.asked() == []
+    finally:
+        process.close()
 
 
 @contextmanager
