@@ -68,7 +68,8 @@ class Spectator:
             out.append(tile_message([(place, board.tiles[place]) for place in places if place in board.tiles]))
         if board.frame is not None and board.frame_count != self._frame:
             self._frame = board.frame_count
-            out.append(json.dumps({**board.frame, "news": board.news_since(self._news)}))
+            all_told = self._news == board.news_count - len(board.frame["news"])
+            out.append(board.frame_text if all_told else board.frame_with(board.news_since(self._news)))
             self._news = board.news_count
         return out
 
@@ -80,6 +81,8 @@ class LiveBoard:
         self.takes_actions = takes_actions
         self.scene: Json | None = None
         self.frame: Json | None = None
+        self.frame_text = ""
+        """The same as the run has said it, to be passed on as it is."""
         self.frame_count = 0
         self.tiles: dict[Place, bytes] = {}
         self.past = Past()
@@ -107,8 +110,12 @@ class LiveBoard:
         missed = min(self.news_count - count, len(kept))
         return list(kept)[len(kept) - missed :] if missed > 0 else []
 
-    def take(self, message: Json) -> None:
-        """A scene, a frame or a piece of the past of the run."""
+    def frame_with(self, news: list[Json]) -> str:
+        """The newest frame with other news than its own."""
+        return json.dumps({**(self.frame or {}), "news": news})
+
+    def take(self, message: Json, text: str | None = None) -> None:
+        """A scene, a frame or a piece of the past of the run. ``text``: the same as it came, if it is known."""
         if message["kind"] == "scene":
             anew = self.scene is None or any(self.scene.get(key) != message.get(key) for key in RUN_KEYS)
             if anew and self.scene is not None:
@@ -123,6 +130,7 @@ class LiveBoard:
             self._take_past(message)
         else:
             self._take_frame(message)
+            self.frame_text = json.dumps(message) if text is None else text
         self._wake()
 
     def take_tiles(self, message: bytes) -> None:

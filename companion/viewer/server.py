@@ -158,15 +158,16 @@ class WebApp:
 
     async def _tell(self, socket: WebSocket, spectator: Spectator, news: asyncio.Event) -> None:
         while True:
+            # ``wait_for`` would make a task each time, which costs more than the message.
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(news.wait(), BEAT_S)
+                async with asyncio.timeout(BEAT_S):
+                    await news.wait()
             if not news.is_set():
-                await asyncio.wait_for(socket.send_text(BEAT), SEND_S)
+                await _sent(socket, BEAT)
             news.clear()
             while messages := spectator.messages():
                 for message in messages:
-                    sends = socket.send_text(message) if isinstance(message, str) else socket.send_bytes(message)
-                    await asyncio.wait_for(sends, SEND_S)
+                    await _sent(socket, message)
 
     async def _hear(self, socket: WebSocket, spectator: Spectator) -> None:
         times_s: deque[float] = deque([-1.0] * ACTIONS_A_SECOND, maxlen=ACTIONS_A_SECOND)
@@ -256,6 +257,12 @@ class _Counted(WebSocketsSansIOProtocol):
             super().data_received(data)
 
 
+async def _sent(socket: WebSocket, message: str | bytes) -> None:
+    """Send it. Raises TimeoutError if it is not taken."""
+    async with asyncio.timeout(SEND_S):
+        await (socket.send_text(message) if isinstance(message, str) else socket.send_bytes(message))
+
+
 def _is_number(value: object, most: float) -> bool:
     """Whether it is a number within bounds; an integer of hundreds of digits is no float."""
     return isinstance(value, int | float) and not isinstance(value, bool) and -most < value < most
@@ -334,7 +341,7 @@ def _listen(app: WebApp, server: uvicorn.Server, loop: asyncio.AbstractEventLoop
         if message["kind"] == "answer":
             app.answer(message)
         else:
-            app.board.take(message)
+            app.board.take(message, payload.decode())
 
     with contextlib.suppress(ValueError, OSError, RuntimeError):
         while (message := wire.read_message(sys.stdin.buffer)) is not None:
