@@ -32,9 +32,12 @@ def serve(
     while running():
         _exchange(simulator, endpoints, now_s())
         goal_s = (now_s() - began_s) * speedup
-        if goal_s - simulator.time_s > LATE_S * max(speedup, 1.0):
-            began_s += (goal_s - simulator.time_s) / speedup
+        late_s = goal_s - simulator.time_s
+        if late_s > LATE_S * max(speedup, 1.0):
+            began_s += late_s / speedup
             goal_s = simulator.time_s + STEP_S
+            for lidar in simulator.lidars:
+                lidar.clock_ahead_s += late_s
         simulator.advance_to_s(goal_s)
         _exchange(simulator, endpoints, now_s())
         log.look(simulator)

@@ -72,6 +72,9 @@ class SerialLidar:
         self.faults = LineFaults()
         self.cuts = 0
         """How often the cable was pulled and put in again."""
+        self.clock_ahead_s = 0.0
+        """Its own clock has gone on while the simulator stood still: else all that it sends later would count as
+        late."""
         self._world = world
         self._noise_m = noise_m
         self._rng = rng
@@ -119,7 +122,7 @@ class SerialLidar:
         angle_deg, range_m = self._as_told(angle_deg, range_m)
         if self._plugged and self._encoder.talks and self.faults.defect is not Defect.SILENT:
             quality = np.where(range_m > 0.0, make.most_quality * (1.0 - 0.8 * range_m / make.max_m), 0.0)
-            self._send(self._encoder.encode(angle_deg, range_m, quality, time_s))
+            self._send(self._encoder.encode(angle_deg, range_m, quality, time_s + self.clock_ahead_s))
 
     def _plug(self) -> None:
         """A lidar that gets power again begins anew, and waits for commands."""

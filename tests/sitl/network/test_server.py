@@ -6,6 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
@@ -15,6 +16,8 @@ from sitl.network import Endpoint, ListenError, open_endpoint
 from sitl.network.endpoint import datagrams
 from sitl.network.event_log import EventLog
 from sitl.network.server import serve
+from sitl.sensors.lidar_bytes import MAKES
+from sitl.sensors.serial_lidar import MountedLidar
 from sitl.simulator import Simulator
 from sitl.world.truth import Collision
 from tests.support.sitl_client import open_ground
@@ -170,6 +173,28 @@ def test_a_rebooting_vehicle_drops_its_tcp_clients(bench: Bench) -> None:
     with socket.create_connection(("127.0.0.1", port)) as client:
         bench.run(5.0)
         assert "HEARTBEAT" in kinds(read_all(client))
+
+
+def test_the_clock_of_a_lidar_goes_on_while_the_simulator_stands_still() -> None:
+    """As that of a real one does: what it sends after it is not late."""
+    simulator = open_ground(lidars=[MountedLidar(MAKES["LD19"])])
+    heard: list[tuple[float, int]] = []
+    now_s = 0.0
+
+    def clock() -> float:
+        nonlocal now_s
+        now_s += 1.5 if len(heard) == 10 else 0.01
+        return now_s
+
+    def listen() -> None:
+        if data := simulator.lidars[0].take():
+            heard.append((now_s, int.from_bytes(data[-3:-1], "little")))  # its time in ms, before the check sum
+
+    serve(simulator, [], clock, 1.0, lambda: now_s < 10.0, observe=listen)
+    began_s, began_ms = heard[1]
+    late_s = [time_s - began_s - (told_ms - began_ms) / 1000.0 for time_s, told_ms in heard[1:]]
+    assert max(np.diff([time_s for time_s, _ in heard])) > 1.5 and simulator.time_s < 9.0, "it stood still"
+    assert max(map(abs, late_s[-50:])) < 0.1
 
 
 def test_udp_out_sends_first_and_hears_answers(bench: Bench) -> None:
