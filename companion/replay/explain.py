@@ -236,13 +236,14 @@ def explanation_lines(why: Explanation) -> list[str]:
     decision, pose = why.decision, why.pose
     here, goal = why.state.past[-1], why.state.target
     cell = why.grid.cell_at(pose.point)
+    past = len(why.state.past)
     returning = ", going back along it" if why.state.returning else ""
     lines = [
         f"decision {why.number} at {why.time_s:.2f} s, heading for {why.target}: "
         f"{decision.action} (part {decision.part}): {decision.reason}",
         f"rover in field {cell.x}, {cell.y} (north {pose.north_m:.2f} m, east {pose.east_m:.2f} m, heading "
         f"{math.degrees(pose.heading_rad) % 360.0:.0f} deg), last step in {here.x}, {here.y}; "
-        f"target field {goal.x}, {goal.y}; {len(why.state.past)} fields of past path{returning}",
+        f"target field {goal.x}, {goal.y}; past path of {past} field{'s' * (past != 1)}{returning}",
         f"map: {why.grid.width} x {why.grid.height} fields of {why.grid.resolution_m:g} m, "
         f"{np.count_nonzero(why.known) / why.known.size:.0%} seen, "
         f"{np.count_nonzero(why.grid.weights >= OBSTACLE)} are obstacles",

@@ -138,7 +138,12 @@ def _heat_map(mission_file: Path, results: dict[str, list[RunResult]]) -> Figure
         panel.set_ylabel("metres north", fontsize=8)
         panel.tick_params(labelsize=8)
         drawing.title(
-            panel, _wrapped(f"{mission_file.stem}, {name}: {len(results[name])} runs", width, TITLE_LETTER_IN)
+            panel,
+            _wrapped(
+                f"{mission_file.stem}, {name}: {len(results[name])} run{'s' * (len(results[name]) != 1)}",
+                width,
+                TITLE_LETTER_IN,
+            ),
         )
     for panel in panels[len(spent) :]:
         panel.set_visible(False)

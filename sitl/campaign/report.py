@@ -95,7 +95,8 @@ def _lists(campaign: CampaignTable, runs: Runs, source: Path) -> list[str]:
         f"<p>To drive one run again, with a record: <code>{html.escape(again)}</code></p>",
     ]
     more = f"; the first {MOST_LISTED} of them" if len(bad) > MOST_LISTED else ""
-    parts += [f"<p>{len(bad)} runs were not complete, or broke a policy{more}.</p>"] if bad else []
+    count = "1 run was" if len(bad) == 1 else f"{len(bad)} runs were"
+    parts += [f"<p>{count} not complete, or broke a policy{more}.</p>"] if bad else []
     parts += [_runs(campaign, bad[:MOST_LISTED])] if bad else ["<p>Every run was complete.</p>"]
     return [*parts, "<h2>The slowest</h2>", _runs(campaign, slow)] if slow else parts
 

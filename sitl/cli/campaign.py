@@ -50,7 +50,11 @@ def campaign(
     ] = None,
     record: Annotated[Path | None, typer.Option(help="With --replay: the folder of the record.")] = None,
     search: Annotated[
-        Goal | None, typer.Option(help="Look for runs that do this, instead of driving the lists (needs cma).")
+        Goal | None,
+        typer.Option(
+            metavar="GOAL",
+            help=f"Look for runs that do this, instead of driving the lists (needs cma): {', '.join(Goal)}.",
+        ),
     ] = None,
     budget: Annotated[
         int | None,

@@ -15,7 +15,7 @@ from companion.mapping.evidence_map import integrate, new_map
 from companion.settings import MappingSettings
 
 RAYS = 720
-AIM_MS, MOST_MS = 1.0, 3.0
+AIM_MS, MOST_MS = 1.0, 1.5
 """A busy machine needs half as much again."""
 SIDE_M, RADIUS_M, REACH_M = 40.0, 0.35, 12.0
 MOTIONS = {"evidence_m": 0.1, "hit_depth_m": 0.02, "keeps": "outline"}

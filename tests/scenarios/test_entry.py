@@ -11,9 +11,12 @@ from pathlib import Path
 
 import pytest
 import typer
+from typer.testing import CliRunner
 
+from companion.cli.commands import app as companion_commands
 from companion.cli.entry import StoppedError, start
 from companion.recording.reader import load_record
+from sitl.cli.commands import app as sitl_commands
 from tests.support.forked import run
 from tests.support.quick import first_of
 from tests.support.served import PATIENCE_S, finished, process, slowness
@@ -146,3 +149,14 @@ def test_on_a_narrow_terminal_no_option_is_cut(name: str, words: str) -> None:
     done = subprocess.run(command(name, which, "--help"), capture_output=True, text=True, env=narrow, check=True)
     assert words in done.stdout and "…" not in done.stdout
     assert max(map(len, done.stdout.splitlines())) <= 60
+
+
+@pytest.mark.parametrize("commands", [companion_commands, sitl_commands])
+def test_no_page_of_help_is_wider_than_a_narrow_terminal(
+    commands: typer.Typer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    for name in typer.main.get_group(commands).commands:
+        told = CliRunner().invoke(commands, [name, "--help"], terminal_width=60)
+        assert told.exit_code == 0 and "…" not in told.output, name
+        assert max(map(len, told.output.splitlines())) <= 60, name

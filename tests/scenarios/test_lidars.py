@@ -201,7 +201,7 @@ def test_what_cannot_be_used_is_told_in_one_line(tmp_path: Path, command: list[s
 
 @pytest.mark.slow
 def test_a_whole_mission_in_two_processes_with_a_lidar_on_a_pseudo_terminal(tmp_path: Path) -> None:
-    """The cable is pulled for a moment while the autopilot starts, and once while the rover drives."""
+    """The cable is pulled for a moment while the autopilot starts."""
     path = mission_path(yard(tmp_path))
     faults = tmp_path / "faults.toml"
     faults.write_text('[[fault]]\nkind = "lidar_unplugged"\nstart_s = 20.0\nduration_s = 2.0\n')

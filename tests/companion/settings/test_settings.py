@@ -122,3 +122,10 @@ def test_a_whole_number_that_no_kernel_takes_is_refused() -> None:
     assert parse_settings({"navigator": {"quick": {"max_epochs": 2**31 - 1}}}, "s.toml")
     with pytest.raises(SettingsError, match=r"navigator\.quick: max_epochs should be at most 2147483647"):
         parse_settings({"navigator": {"quick": {"max_epochs": 2**31}}}, "s.toml")
+
+
+@pytest.mark.parametrize("wrong", ["1.5", "1,5", " 2 "])
+def test_a_number_in_quotes_is_refused_with_what_to_write(wrong: str) -> None:
+    right = wrong.strip().replace(",", ".")
+    with pytest.raises(SettingsError, match=rf"motion.turn_rad_s.*; write {right} without quotes$"):
+        parse_settings({"motion": {"turn_rad_s": wrong}}, "test")
