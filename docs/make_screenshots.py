@@ -82,7 +82,7 @@ def _drive(run: Drive, viewer: LiveViewer) -> None:
     pace = Pace(SPEEDUP, WallClock())
     while run.simulator.driven_m < DRIVEN_M and not run.companion.done:
         run.companion.tick()
-        viewer.show(run.companion.status())
+        viewer.show(run.companion.status(), ())
         if run.simulator.driven_m > 0.0:
             pace.wait(run.simulator.time_s)
 
@@ -94,7 +94,7 @@ def _kept_fresh(run: Drive, viewer: LiveViewer) -> Iterator[None]:
 
     def show() -> None:
         while not over.wait(SHOW_S):
-            viewer.show(status)
+            viewer.show(status, ())
 
     thread = threading.Thread(target=show)
     thread.start()
