@@ -22,6 +22,7 @@ from companion.safety.reasons import Activity, Doubt, EndReason, LatchReason, Po
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.events import RoverMode
 from companion.viewer.frame import (
+    MAKES_WAY,
     MOST_PATH,
     MOST_RAYS,
     _border,
@@ -99,6 +100,8 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         (DRIVING, {"action": Action.BACKTRACK}, "going back to find another way to gate", ""),
         (DRIVING, {"makes_way": True}, "driving to gate", "making way for something that moves"),
         (DRIVING, {"broken_off": LOW}, "driving to gate", "battery low for the autopilot"),
+        (DRIVING, {"broken_off": LOW, "makes_way": True}, "driving to gate", f"{LOW}; {MAKES_WAY}"),
+        (DRIVING, {"broken_off": LOW, "held_up": "stuck"}, "stuck", "battery low for the autopilot"),
         (WAITING, {}, "waiting for arming", "asked for; the autopilot says if it refuses"),
         (HELD, {}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
         (BLINDED, {}, "stopped: range data silent for over 1 s", "waiting for good data and a person to set X"),
@@ -139,7 +142,7 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
     )  # fmt: skip
     decision = SimpleNamespace(action=given.get("action", Action.FOLLOW))
     status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=decision)
-    doing = doing_of(cast(Any, companion), cast(Any, status))
+    doing = doing_of(cast(Any, companion), cast(Any, status), given.get("held_up", ""))
     assert (doing["line"], doing["why"]) == (line, why)
 
 

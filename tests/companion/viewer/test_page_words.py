@@ -173,6 +173,33 @@ tell(moments.map((one) => (headline.show({ live: true }, { ...frame, ...one }, "
     assert ran(tmp_path, DOCUMENT + script) == whole
 
 
+def test_why_a_rover_drives_otherwise_is_told_beside_how_far_it_is(tmp_path: Path) -> None:
+    script = """
+const { Headline } = await import("./headline.js");
+const headline = new Headline();
+const frame = {
+  state: "driving", t: 1, pose: [0, 0, 0], goal: { name: "home", place: [0, 12] }, speed: 0, why: "battery at 18 %",
+};
+const moments = [{ setpoint: { kind: "heading", heading: -0.14 } }, { goal: null }, { state: "stopped" }];
+tell(moments.map((one) => (headline.show({ live: true }, { ...frame, ...one }, "", true), headline.why.textContent)));
+"""
+    turns, without, stopped = ran(tmp_path, DOCUMENT + script)
+    assert turns == "Battery at 18 % · Turning to 352° · 12.0 m straight"
+    assert without == stopped == "Battery at 18 %"
+
+
+def test_what_holds_up_a_rover_that_is_led_is_marked_on_the_timeline(tmp_path: Path) -> None:
+    script = """
+globalThis.Path2D = class {};
+const { Record } = await import("./record.js");
+const frames = ["", "stuck", "stuck", "", "stuck"].map((held, t) => (
+  { t, state: "driving", line: held || "driving", held_up: held, pose: [t, 0, 0] }
+));
+tell(new Record({ scene: {}, frames }).events.map((one) => [one.t, one.kind, one.text, one.place]));
+"""
+    assert ran(tmp_path, script) == [[1, "stop", "stuck", [1, 0]], [4, "stop", "stuck", [4, 0]]]
+
+
 def test_a_button_that_would_do_nothing_is_locked_and_says_why(tmp_path: Path) -> None:
     script = """
 const { locks } = await import("./actions.js");
