@@ -133,7 +133,7 @@ return import('viewer/model.js').then(({ Model }) => {
 """
 """From now on no position is heard."""
 LOCKED = """
-return Object.fromEntries([...document.querySelectorAll('.actions button:disabled')].map(one =>
+return Object.fromEntries([...document.querySelectorAll('.actions [aria-disabled]')].map(one =>
     [one.innerText.trim(), one.title]))
 """
 """Why buttons would do nothing."""
@@ -268,6 +268,8 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
                 desktop.shows("The pilot drives (MANUAL)")
                 locked = {"Go on": "Not paused here", "Send here": "Only while the companion drives"}
                 desktop.until(lambda: desktop.run(LOCKED) == locked)
+                desktop.press("Send here")
+                desktop.shows("Send here: only while the companion drives")
                 another.child.send_signal(signal.SIGINT)
 
 

@@ -206,15 +206,38 @@ const { locks } = await import("./actions.js");
 const drives = { state: "driving", drives: "companion", goal: { name: "X" }, paused: false };
 tell([
   [drives, true], [drives, false], [{ ...drives, state: "ended" }, true], [{ ...drives, goal: null }, true],
-  [{ ...drives, drives: "nobody", paused: true }, true], [null, true],
+  [{ ...drives, drives: "nobody", paused: true }, true], [null, true], [{ ...drives, paused: true }, true, true],
 ].map((one) => locks(...one)));
 """
-    driving, lost, ended, without, paused, nothing = ran(tmp_path, DOCUMENT + script)
+    driving, lost, ended, without, paused, nothing, old = ran(tmp_path, DOCUMENT + script)
     assert driving == {"pause": "", "resume": "Not paused here", "skip": "", "goto": ""}
     assert set(lost.values()) == {"Not connected"} and set(ended.values()) == {"The run has ended"}
     assert without["skip"] == without["goto"] != "" and without["pause"] == ""
     assert paused == {"pause": "", "resume": "", "skip": "", "goto": "Only while the companion drives"}
+    assert old == {"pause": "", **dict.fromkeys(("resume", "skip", "goto"), "No data: what is shown here is old")}
     assert nothing["pause"] == "" and all(nothing[name] for name in ("resume", "skip", "goto"))
+
+
+def test_a_locked_button_that_is_pressed_says_why_and_does_nothing(tmp_path: Path) -> None:
+    script = """
+const { Actions } = await import("./actions.js");
+globalThis.setTimeout = () => {};
+const sent = [];
+const model = { frame: { state: "driving", drives: "companion", goal: { name: "X" }, paused: false, t: 1 } };
+const view = { above: [], invalidate() {} };
+const stage = { classList: { add() {}, remove() {} } };
+const actions = new Actions(new Element(), stage, model, view, { send: (one) => sent.push(one.action) });
+const { resume, pause } = actions.byAction;
+const press = (button) => (button.onclick(), actions.toast.textContent);
+actions.show({ may_act: true }, true);
+const locked = press(resume);
+model.frame.paused = true;
+actions.show({ may_act: true }, true);
+tell([locked, resume.getAttribute("aria-disabled"), press(resume), press(pause), sent]);
+"""
+    locked, freed, pressed, paused, sent = ran(tmp_path, DOCUMENT + script)
+    assert (locked, freed) == ("Go on: not paused here", None)
+    assert (pressed, paused, sent) == ("Go on: sent", "Pause: sent", ["resume", "pause"])
 
 
 def test_distances_and_the_last_speed_are_named_for_what_they_are(tmp_path: Path) -> None:
