@@ -277,3 +277,25 @@ const { radii } = await import("./layer_marks.js");
 tell(radii([[100, 50], [0, 0], [116, 50], [100, 50.5], [100, 200], [110, 218]]));
 """
     assert ran(tmp_path, DOCUMENT + script) == [6, 12, 7, 6, pytest.approx(9.3, abs=0.1), pytest.approx(9.3, abs=0.1)]
+
+
+@pytest.mark.parametrize(("width", "covered_right"), [(360, 66), (390, 123), (900, 70)])
+def test_scale_and_colours_of_the_track_lie_where_no_button_is(tmp_path: Path, width: int, covered_right: int) -> None:
+    script = """
+const { drawFrame } = await import("./layer_frame.js");
+const plates = [];
+const context = new Proxy({}, {
+  get: (_, name) => (...given) => { if (name === "roundRect") plates.push(given.slice(0, 4)); },
+  set: () => true,
+});
+const camera = { width: WIDTH, height: 400, coveredRight: COVERED, covered: 0, scale: 20, up: 0 };
+const nothing = () => {};
+const pen = { context, camera, colours: { speeds: Array(5) }, widthOf: () => 45, text: nothing, stroke: nothing };
+drawFrame({ ...pen, disc: nothing }, { track: { points: [1, 2], topSpeed: 1.5 } });
+tell(plates);
+"""
+    scale, colours = ran(tmp_path, script.replace("WIDTH", str(width)).replace("COVERED", str(covered_right)))
+    for left, _, wide, _ in (scale, colours):
+        assert left >= 0 and left + wide <= width - covered_right
+    beside = scale[0] + scale[2] <= colours[0]
+    assert beside if width - covered_right > 300 else colours[1] + colours[3] <= scale[1]
