@@ -256,6 +256,21 @@ tell(moments.map((one) => readouts({ ...frame, ...one }).slice(0, 2).map((each) 
     assert (rolls[0], stands[0]) == ("last speed 0.4 m/s", "speed 0.0 m/s")
 
 
+def test_above_a_figure_stands_its_value_of_now_and_none_after_the_end(tmp_path: Path) -> None:
+    script = """
+const { writeFileSync } = await import("node:fs");
+writeFileSync("./uplot.js", "export default class {}");
+const { valueOf } = await import("./charts.js");
+const { KINDS } = await import("./figures.js");
+const of = (...given) => valueOf(KINDS[0], ...given);
+tell([
+  of({ speed: -0.01 }), of({ speed: -0.52 }), of({ speed: 0.4, state: "ended" }), of({ state: "ended" }, 0.4),
+  of({ speed: 0.4 }, null), of(null),
+]);
+"""
+    assert ran(tmp_path, DOCUMENT + script) == ["0.0 m/s", "0.5 m/s", "–", "0.4 m/s", "–", "–"]
+
+
 def test_a_simulator_lists_the_targets_of_the_mission_without_saying_what_became_of_them(tmp_path: Path) -> None:
     script = """
 const { Panel } = await import("./panel.js");
