@@ -52,6 +52,8 @@ MOST_MISSED = 3
 """So many targets that were not reached are named."""
 REACHED = TargetStatus.REACHED
 RESTARTED = "autopilot restarted, rover disarmed"
+SOMEBODY = "a person, or by the autopilot itself"
+BY_MODE = (WaitReason.PERSON_SETS_MODE, WaitReason.PERSON_SETS_MODE_AND_ARMS)
 MAKES_WAY, SEPARATOR = str(Hindrance.MAKES_WAY.value), "; "
 NOT_REACHED = {TargetStatus.PENDING: "not reached"}
 NEWEST_S = 0.5
@@ -223,7 +225,7 @@ def doing_of(companion: Companion, status: Status, held_up: str = "") -> Json:
     if activity.phase is RunPhase.DRIVING and status.target:
         line, why = _driving(companion, status, held_up)
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
-        line, why = _stopped(companion.vehicle, activity)
+        line, why = _stopped(companion, activity)
     elif activity.phase is RunPhase.WAITING:
         line, _, why = line.partition(" (")
         why = why.removesuffix(")")
@@ -250,16 +252,19 @@ def _driving(companion: Companion, status: Status, held_up: str) -> tuple[str, s
     return line, SEPARATOR.join(why)
 
 
-def _stopped(vehicle: VehicleState, activity: Activity) -> tuple[str, str]:
+def _stopped(companion: Companion, activity: Activity) -> tuple[str, str]:
     """Why it stands, and what for. Data that is missing comes before the mode: mostly the one has led to the other.
 
     An autopilot that has restarted has disarmed the rover, and has led to everything else.
     """
+    vehicle = companion.vehicle
     if vehicle.restarted and vehicle.heartbeat is not None and not vehicle.heartbeat.armed:
         return f"stopped: {RESTARTED}", f"waiting for {activity.awaited}"
     if activity.awaited is not None and activity.awaited.kind is WaitReason.GOOD_DATA_AND:
         data, person = activity.awaited.figures
         return f"stopped: {data}", f"waiting for good data and {person}"
+    if companion.mission_run.taken_over and activity.awaited is not None and activity.awaited.kind in BY_MODE:
+        return f"stopped: {mode_name(vehicle)} was set by {SOMEBODY}", f"waiting for {activity.awaited}"
     return f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
 
 

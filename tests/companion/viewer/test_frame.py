@@ -25,6 +25,7 @@ from companion.viewer.frame import (
     MAKES_WAY,
     MOST_PATH,
     MOST_RAYS,
+    SOMEBODY,
     _border,
     _outline,
     _places,
@@ -90,6 +91,7 @@ DONE, BY_USER = (Activity(RunPhase.ENDED, Reason(kind)) for kind in (EndReason.D
 LOW = Reason(PowerReason.LOW, ("battery",))
 ROLLS, PILOT = {"forward_m_s": 1.0}, {"mode": RoverMode.MANUAL}
 RESTARTED = {"restarted": True, "armed": False}
+TAKEN = {"taken_over": True}
 SHED = {"shed": TargetStatus.UNREACHABLE}
 
 
@@ -112,6 +114,8 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
             "waiting for a person to set X",
         ),
         (HELD, {**RESTARTED, "armed": True}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
+        (HELD, TAKEN, f"stopped: HOLD was set by {SOMEBODY}", "waiting for a person to set X"),
+        (HELD, {**PILOT, **TAKEN}, "the pilot drives (MANUAL)", "waiting for a person to set X"),
         (HELD, PILOT, "the pilot drives (MANUAL)", "waiting for a person to set X"),
         (DOUBTED, {}, "stopped: position wanders", ""),
         (DOUBTED, ROLLS, "stopping: position wanders", ""),
@@ -134,7 +138,10 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
         heartbeat=heartbeat, is_ours=False, forward_m_s=given.get("forward_m_s", 0.0),
         restarted=given.get("restarted", False),
     )  # fmt: skip
-    run = SimpleNamespace(stop=SimpleNamespace(reason=activity.reason), latch=SimpleNamespace(control=Control.PERSON))
+    run = SimpleNamespace(
+        stop=SimpleNamespace(reason=activity.reason), latch=SimpleNamespace(control=Control.PERSON),
+        taken_over=given.get("taken_over", False),
+    )  # fmt: skip
     statuses = [("gate", TargetStatus.REACHED), *((name, given[name]) for name in ("shed",) if name in given)]
     companion = SimpleNamespace(
         outcome=SimpleNamespace(broken_off=given.get("broken_off")), mission_run=run, vehicle=vehicle,
