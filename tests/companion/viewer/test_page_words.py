@@ -218,6 +218,19 @@ tell([
     assert nothing["pause"] == "" and all(nothing[name] for name in ("resume", "skip", "goto"))
 
 
+def test_the_token_is_kept_for_the_tab_and_taken_out_of_the_address(tmp_path: Path) -> None:
+    script = """
+const kept = {};
+globalThis.sessionStorage = { getItem: (name) => kept[name] ?? null, setItem: (name, text) => { kept[name] = text; } };
+globalThis.location = { hash: "#token=a%2Bb", pathname: "/page", search: "?x=1" };
+const shown = [];
+globalThis.history = { replaceState: (state, title, address) => { shown.push(address); location.hash = ""; } };
+const { findToken } = await import("./token.js");
+tell([findToken(), findToken(), shown]);
+"""
+    assert ran(tmp_path, DOCUMENT + script) == ["a+b", "a+b", ["/page?x=1"]]
+
+
 def test_a_locked_button_that_is_pressed_says_why_and_does_nothing(tmp_path: Path) -> None:
     script = """
 const { Actions } = await import("./actions.js");
