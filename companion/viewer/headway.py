@@ -27,7 +27,7 @@ class Hindrance(Enum):
 
     STUCK = "stuck, looking for another way"
     MAKES_WAY = "making way for something that moves"
-    HARDLY = "hardly getting on"
+    HARDLY = "hardly any progress"
 
 
 class Headway:
@@ -48,7 +48,8 @@ class Headway:
     def note(self, companion: Companion, status: Status) -> None:
         """To be called after each tick."""
         before, self.hindrance = self.hindrance, self._look(companion, status)
-        self.line = "" if self.hindrance is None else f"{self.hindrance.value} on the way to {status.target}"
+        where = " to" if self.hindrance is Hindrance.STUCK else ", heading for"
+        self.line = "" if self.hindrance is None else f"{self.hindrance.value}{where} {status.target}"
         self.begins = self.hindrance not in (None, before)
 
     def _look(self, companion: Companion, status: Status) -> Hindrance | None:

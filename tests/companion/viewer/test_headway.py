@@ -13,6 +13,11 @@ from companion.viewer.frame import news_of
 from companion.viewer.headway import Headway, Hindrance
 
 STEP_S = 0.1
+TOLD = {
+    Hindrance.STUCK: "stuck, looking for another way to gate",
+    Hindrance.MAKES_WAY: "making way for something that moves, heading for gate",
+    Hindrance.HARDLY: "hardly any progress, heading for gate",
+}
 
 
 def watched(
@@ -33,7 +38,7 @@ def watched(
         told += [one["text"] for one in news_of(cast(Any, status), headway)]
         if headway.hindrance is not changes[-1][1]:
             changes.append((round(time_s, 1), headway.hindrance))
-    assert told == [f"{one.value} on the way to gate" for _, one in changes if one is not None]
+    assert told == [TOLD[one] for _, one in changes if one is not None]
     return changes[1:]
 
 
