@@ -77,8 +77,8 @@ class MissionRun:
     """What all parts of the companion share of a run.
 
     Each attribute has one writer: the event dispatcher writes ``vehicle`` (after an error, the shutdown), the drive
-    permission ``latch`` and ``stop``, arming ``awaited``, the shutdown ``end``, the mission requests ``paused``.
-    ``activity`` follows from them.
+    permission ``latch``, ``stop`` and ``taken_over``, arming ``awaited``, the shutdown ``end``, the mission requests
+    ``paused``. ``activity`` follows from them.
     """
 
     def __init__(
@@ -101,6 +101,8 @@ class MissionRun:
         """What arming waits for; None before it has looked."""
         self.stop: Stop | None = None
         """Why the rover was not to be driven in the last tick; None if it was."""
+        self.taken_over = False
+        """Somebody else changed the mode while the companion had the rover: a person, or the autopilot itself."""
         self.end: Reason[EndReason] | None = None
         """Why the run ends; None while it goes on."""
         self.paused = False

@@ -48,6 +48,7 @@ class DrivePermission:
         if changed or (drives and before is not Control.COMPANION):
             run.start_afresh()
         run.stop = None if drives else self._stop(verdict, now_s)
+        run.taken_over = not drives and (run.taken_over or _is_taken(verdict, before))
         if not drives:
             self._tell(verdict, before)
         return verdict
@@ -75,3 +76,9 @@ class DrivePermission:
                 self._notifier.tell(f"Companion silent: {verdict.reason}", Severity.WARNING)
             case _:
                 pass
+
+
+def _is_taken(verdict: Verdict, before: Control) -> bool:
+    """Whether somebody else changes the mode now. After a HOLD of its own the companion has not had the rover."""
+    other = verdict.reason is not None and verdict.reason.kind is LatchReason.OTHER_MODE
+    return other and verdict.reaction is Reaction.SILENT and before is Control.COMPANION

@@ -18,6 +18,7 @@ from companion.safety.reasons import EndReason
 from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of, told
+from companion.viewer.headway import Headway
 from companion.viewer.last_place import LastPlace
 from companion.viewer.map_tiles import TileWatch
 from companion.viewer.retelling import Receiver, Retelling, run_id
@@ -45,7 +46,7 @@ class ViewerFeed:
         self._news: list[Json] = []
         self._retelling = Retelling(receiver)
         self._rates = Arrivals()
-        self._last_place = LastPlace()
+        self._last_place, self._headway = LastPlace(), Headway()
         self.steady = SteadyFrame()
         self.touched: Sequence[Sequence[float]] | None = None
         """Where a simulated rover touched something, north and east; whoever knows it writes it here."""
@@ -58,7 +59,8 @@ class ViewerFeed:
 
     def show(self, status: Status) -> None:
         """To be called after each tick."""
-        self._note(news_of(status))
+        self._headway.note(self._companion, status)
+        self._note(news_of(status, self._headway))
         self._rates.note(self._companion.vehicle)
         if self._retelling.begins():
             self._news, self._scene, self._scene_s = [], {}, -math.inf
@@ -127,7 +129,7 @@ class ViewerFeed:
     def _frame(self, status: Status) -> Json:
         executor = self._companion.executor
         self.steady.note(None if executor is None else executor.layout.origin)
-        frame = self.steady.frame(frame_of(self._companion, status))
+        frame = self.steady.frame(frame_of(self._companion, status, self._headway.line))
         if self.ended_by and frame["state"] == "ended":
             stopped = str(EndReason.STOPPED_BY_USER.value)
             frame["line"] = frame["line"].replace(stopped, f"ended, {self.ended_by}", 1)

@@ -37,6 +37,7 @@ from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelo
 from companion.vehicle.events import RoverMode
 from companion.vehicle.state import VehicleState
 from companion.viewer.even_rays import even_rays
+from companion.viewer.headway import Headway, Hindrance
 from companion.viewer.map_tiles import TILE
 
 FORMAT = 1
@@ -51,7 +52,9 @@ MOST_MISSED = 3
 """So many targets that were not reached are named."""
 REACHED = TargetStatus.REACHED
 RESTARTED = "autopilot restarted, rover disarmed"
-MAKES_WAY = "making way for something that moves"
+SOMEBODY = "a person, or by the autopilot itself"
+BY_MODE = (WaitReason.PERSON_SETS_MODE, WaitReason.PERSON_SETS_MODE_AND_ARMS)
+MAKES_WAY, SEPARATOR = str(Hindrance.MAKES_WAY.value), "; "
 NOT_REACHED = {TargetStatus.PENDING: "not reached"}
 NEWEST_S = 0.5
 """A scan or a planned motion that is older is not shown."""
@@ -113,8 +116,8 @@ def scene_of(mission: Mission, run: MissionRun, epoch: int) -> Json:
     }
 
 
-def frame_of(companion: Companion, status: Status) -> Json:
-    """The moment. ``news`` are those of this tick alone."""
+def frame_of(companion: Companion, status: Status, held_up: str = "") -> Json:
+    """The moment. ``news`` are those of this tick alone. ``held_up``: why a rover that is led does not get on."""
     run, executor = companion.mission_run, companion.executor
     vehicle, now_s, pose = run.vehicle, status.time_s, status.pose
     return {
@@ -124,7 +127,8 @@ def frame_of(companion: Companion, status: Status) -> Json:
         "speed": None if vehicle.position is None else round(vehicle.forward_m_s, 3),
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
         **mode_of(vehicle, run),
-        **doing_of(companion, status),
+        **doing_of(companion, status, held_up),
+        "held_up": held_up,
         "statuses": [str(one) for _, one in run.statuses()],
         "goal": _goal(executor),
         "path": _path(executor),
@@ -142,9 +146,12 @@ def frame_of(companion: Companion, status: Status) -> Json:
     }
 
 
-def news_of(status: Status) -> list[Json]:
-    """The texts of this tick."""
-    return [told(status.time_s, LEVELS.get(one.severity, "error"), one.text, own=one.own) for one in status.news]
+def news_of(status: Status, headway: Headway | None = None) -> list[Json]:
+    """The texts of this tick; the last one, where it begins now, why the rover does not get on."""
+    news = [told(status.time_s, LEVELS.get(one.severity, "error"), one.text, own=one.own) for one in status.news]
+    if headway is not None and headway.begins:
+        news.append(told(status.time_s, "notice", headway.line))
+    return news
 
 
 def told(time_s: float, level: str, text: str, *, own: bool = True) -> Json:
@@ -212,13 +219,13 @@ def _map(executor: MissionExecutor) -> Json:
     }
 
 
-def doing_of(companion: Companion, status: Status) -> Json:
+def doing_of(companion: Companion, status: Status, held_up: str = "") -> Json:
     """One large line; then what is awaited where it says why the rover stands, or why it drives back."""
     activity, line, why = status.activity, status.doing, ""
     if activity.phase is RunPhase.DRIVING and status.target:
-        line, why = _driving(companion, status)
+        line, why = _driving(companion, status, held_up)
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
-        line, why = _stopped(companion.vehicle, activity)
+        line, why = _stopped(companion, activity)
     elif activity.phase is RunPhase.WAITING:
         line, _, why = line.partition(" (")
         why = why.removesuffix(")")
@@ -232,26 +239,32 @@ def doing_of(companion: Companion, status: Status) -> Json:
     return {"line": line, "why": why, "state": state}
 
 
-def _driving(companion: Companion, status: Status) -> tuple[str, str]:
-    """Where to, or that it goes back first; then why the mission was broken off, or that it makes way."""
+def _driving(companion: Companion, status: Status, held_up: str) -> tuple[str, str]:
+    """Where to, that it goes back first, or why it does not get on; then why early, and that it makes way."""
     goes_back = status.decision is not None and status.decision.action is Action.BACKTRACK
     line = f"going back to find another way to {status.target}" if goes_back else f"driving to {status.target}"
-    if companion.outcome.broken_off is not None:
-        return line, str(companion.outcome.broken_off)
-    makes_way = companion.executor is not None and companion.executor.driver.makes_way
-    return line, MAKES_WAY if makes_way else ""
+    early = companion.outcome.broken_off
+    why = [] if early is None else [str(early)]
+    if held_up:
+        return held_up, SEPARATOR.join(why)
+    if companion.executor is not None and companion.executor.driver.makes_way:
+        why.append(MAKES_WAY)
+    return line, SEPARATOR.join(why)
 
 
-def _stopped(vehicle: VehicleState, activity: Activity) -> tuple[str, str]:
+def _stopped(companion: Companion, activity: Activity) -> tuple[str, str]:
     """Why it stands, and what for. Data that is missing comes before the mode: mostly the one has led to the other.
 
     An autopilot that has restarted has disarmed the rover, and has led to everything else.
     """
+    vehicle = companion.vehicle
     if vehicle.restarted and vehicle.heartbeat is not None and not vehicle.heartbeat.armed:
         return f"stopped: {RESTARTED}", f"waiting for {activity.awaited}"
     if activity.awaited is not None and activity.awaited.kind is WaitReason.GOOD_DATA_AND:
         data, person = activity.awaited.figures
         return f"stopped: {data}", f"waiting for good data and {person}"
+    if companion.mission_run.taken_over and activity.awaited is not None and activity.awaited.kind in BY_MODE:
+        return f"stopped: {mode_name(vehicle)} was set by {SOMEBODY}", f"waiting for {activity.awaited}"
     return f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
 
 

@@ -27,6 +27,7 @@ from companion.replay.replay import ReplayObserver, ReplayResult, replay
 from companion.safety.reasons import EndReason, Reason
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import doing_of, frame_of, news_of, scene_of
+from companion.viewer.headway import Headway
 from companion.viewer.last_place import LastPlace
 from companion.viewer.map_tiles import TileWatch
 from companion.viewer.report_tables import Run, differences, tables_of
@@ -130,7 +131,7 @@ class ReportWatch(ReplayObserver):
         self._frame_s = self._path_s = self._tiles_s = -math.inf
         self._watch: TileWatch | None = None
         self._evidence: object = None
-        self._steady, self._last_place = SteadyFrame(), LastPlace()
+        self._steady, self._last_place, self._headway = SteadyFrame(), LastPlace(), Headway()
         self.maps: list[tuple[float, Json | None]] = []
         """From when on which map is shown: another one begins where the companion begins it anew."""
 
@@ -152,12 +153,13 @@ class ReportWatch(ReplayObserver):
         status = companion.status()
         self._rates.note(companion.vehicle)
         self.began_s = status.time_s - time_s
-        self._news += [{**one, "t": round(time_s, 2)} for one in news_of(status)]
+        self._headway.note(companion, status)
+        self._news += [{**one, "t": round(time_s, 2)} for one in news_of(status, self._headway)]
         if time_s - self._frame_s >= FRAME_S - 1e-6 or companion.done:
             self._frame_s = time_s
             self._keep(companion, status, time_s)
             self._take_map(companion, time_s)
-        elif doing_of(companion, status)["state"] != self._before["state"]:
+        elif self._headway.begins or doing_of(companion, status)["state"] != self._before["state"]:
             self._keep(companion, status, time_s)  # however short it is, what the tables count is to be seen
 
     def end(self, companion: Companion, time_s: float, *, stopped_by_user: bool) -> None:
@@ -174,7 +176,7 @@ class ReportWatch(ReplayObserver):
         self._steady.note(None if executor is None else executor.layout.origin)
         if self._start is None and status.pose is not None:
             self._start = status.pose.north_m, status.pose.east_m
-        frame = self._steady.frame(frame_of(companion, status))
+        frame = self._steady.frame(frame_of(companion, status, self._headway.line))
         frame.update({"t": round(time_s, 2), "news": self._news})
         frame["rates"] = self._rates.at(companion.vehicle, status.time_s)
         frame = self._last_place.told(frame, companion.vehicle, status.time_s)

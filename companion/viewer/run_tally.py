@@ -14,6 +14,7 @@ from companion.navigation.field_step import Decision
 from companion.replay.replay import ReplayObserver
 from companion.safety.reasons import Doubt, RunPhase
 from companion.viewer.energy import EnergyMeter
+from companion.viewer.headway import Headway
 
 MOVES_M_S = 0.05
 """A slower rover stands."""
@@ -76,13 +77,14 @@ class RunTally(ReplayObserver):
         self.track: list[tuple[float, float, float]] = []
         """Time, north and east."""
         self._stood, self._doubted = _Spells(), _Spells()
+        self._headway = Headway()
         self._stopped = False
         self._leg_from_m = 0.0
         self._leg_from: NedPoint | None = None
 
     @property
     def stood(self) -> dict[str, Spell]:
-        """Stops and waits, by their reasons."""
+        """Stops, waits and what held up a rover that was led, by their reasons."""
         return self._stood.found
 
     @property
@@ -111,6 +113,7 @@ class RunTally(ReplayObserver):
             self.moving_s += step_s
             self.backwards_m += max(-vehicle.forward_m_s, 0.0) * step_s
         self.energy.take(vehicle.battery)
+        self._headway.note(companion, companion.status())
         self._note_stop(companion, time_s, step_s)
         pose = companion.status().pose
         if pose is not None and (not self.track or time_s - self.track[-1][0] >= TRACK_S - 1e-6):
@@ -122,7 +125,9 @@ class RunTally(ReplayObserver):
         activity = run.activity
         # What is awaited may change while the rover stands for one reason: that is one stop.
         name = str(activity) if activity.phase is not RunPhase.STOPPED_AND_WAITING else f"stopped: {activity.reason}"
-        self._stood.note(name if activity.phase in STOOD else "", time_s, step_s)
+        hindrance = self._headway.hindrance
+        held_up = "" if hindrance is None else hindrance.value
+        self._stood.note(name if activity.phase in STOOD else held_up, time_s, step_s)
         doubt = None if run.stop is None else run.stop.reason
         self._doubted.note(str(doubt) if doubt is not None and isinstance(doubt.kind, Doubt) else "", time_s, step_s)
         stopped = activity.phase in STOPPED

@@ -9,6 +9,7 @@ from companion.app import Status
 from companion.core.clock import stopwatch_s
 from companion.executive.mission_progress import TargetStatus
 from companion.navigation.field_step import Part
+from companion.viewer.headway import Headway
 from companion.viewer.terminal.known import headline_of, known_layers, mission_section, path_ahead, target_places
 from companion.viewer.terminal.painter import Painter
 from companion.viewer.terminal.screen import Headline, Mood, View
@@ -44,6 +45,7 @@ class DriveView:
         self._told_of = (-1, "")
         """The step and the reason of the last decision that was told."""
         self._reason = self._told = ""
+        self._headway = Headway()
         self._repeats = 0
 
     def observe(self, status: Status) -> None:
@@ -51,10 +53,11 @@ class DriveView:
         self._take_in(status)
         now_s = stopwatch_s()
         if self._painter.is_due(now_s):
-            self._show(self._view(status, now_s, headline_of(self._run.companion, status)))
+            self._show(self._view(status, now_s, headline_of(self._run.companion, status, self._headway.line)))
 
     def _take_in(self, status: Status) -> None:
         self._watching.note()
+        self._headway.note(self._run.companion, status)
         collisions = self._run.simulator.collisions
         for collision in collisions[self._collisions :]:
             self._watching.tell(f"{collision.time_s:.0f} s: {collision.told(self._run.scenario.start)}")

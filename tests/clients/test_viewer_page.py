@@ -133,7 +133,7 @@ return import('viewer/model.js').then(({ Model }) => {
 """
 """From now on no position is heard."""
 LOCKED = """
-return Object.fromEntries([...document.querySelectorAll('.actions button:disabled')].map(one =>
+return Object.fromEntries([...document.querySelectorAll('.actions [aria-disabled]')].map(one =>
     [one.innerText.trim(), one.title]))
 """
 """Why buttons would do nothing."""
@@ -181,6 +181,7 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
         with page(DESKTOP) as desktop:
             desktop.open(f"{address}#token={token.read_text(encoding='ascii').strip()}")
             desktop.shows(f"Driving to {name}", "GUIDED", f"Heading for {name}", "companion")
+            assert "#" not in desktop.driver.current_url, "nobody copies the token with the address"
             assert int(str(desktop.run(DRAWN))) > 8
             fits(desktop, DESKTOP)
             desktop.until(lambda: {name: text for name, text in TOLD.items()
@@ -225,6 +226,7 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows("Skip target: done", "Skipping requested goal 1 as requested")
             desktop.resize(PHONE)
             desktop.until(lambda: f"Driving to {name}" in desktop.text)
+            assert re.search(r"live, simulated\s*\d+:\d\d", desktop.text), "on a phone, too"
             desktop.press("Skip target")
             desktop.shows(f"Leave out {name}?")
             fits(desktop, PHONE)
@@ -268,6 +270,8 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
                 desktop.shows("The pilot drives (MANUAL)")
                 locked = {"Go on": "Not paused here", "Send here": "Only while the companion drives"}
                 desktop.until(lambda: desktop.run(LOCKED) == locked)
+                desktop.press("Send here")
+                desktop.shows("Send here: only while the companion drives")
                 another.child.send_signal(signal.SIGINT)
 
 

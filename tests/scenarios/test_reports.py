@@ -437,8 +437,8 @@ def test_a_report_reaches_the_last_moment_of_a_drive_that_was_broken_off_and_say
 ) -> None:
     """Also a stop is seen that was shorter than the time between two frames."""
 
-    def doing(companion: Companion, status: Status) -> dict[str, Any]:
-        told = doing_of(companion, status)
+    def doing(companion: Companion, status: Status, held_up: str = "") -> dict[str, Any]:
+        told = doing_of(companion, status, held_up)
         return {**told, "state": "stopped"} if abs(status.time_s - 50.15) < 0.01 else told
 
     for module in (report_data, frame):

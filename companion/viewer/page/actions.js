@@ -9,21 +9,23 @@ const ANSWER_MS = 4000;
 const TOAST_MS = 6000;
 const NAMES = { pause: "Pause", resume: "Go on", skip: "Skip target", goto: "Send here" };
 
-/** Why each action would do nothing now; empty for those that may be asked for. */
-export function locks(frame, connected) {
+/** Why each action would do nothing now; empty for those that may be asked for. `old`: the frame is of seconds ago. */
+export function locks(frame, connected, old = false) {
   const all = !connected ? "Not connected" : frame?.state === "ended" ? "The run has ended" : "";
+  const late = all || (old ? "No data: what is shown here is old" : "");
   const begun = frame?.goal ? "" : "No target: the mission has not begun, or is over";
   const drives = frame?.drives === "companion" ? "" : "Only while the companion drives";
   return {
     pause: all, // never locked for another reason: whoever wants the rover to stop is not to be kept from it
-    resume: all || (frame?.paused ? "" : "Not paused here"),
-    skip: all || begun,
-    goto: all || begun || drives,
+    resume: late || (frame?.paused ? "" : "Not paused here"),
+    skip: late || begun,
+    goto: late || begun || drives,
   };
 }
 
+// Not "disabled": a locked button that is pressed says why it is locked, since a finger never hovers over it.
 function lock(button, reason) {
-  button.disabled = reason !== "";
+  setAttribute(button, "aria-disabled", reason ? "true" : null);
   setAttribute(button, "title", reason || null);
 }
 
@@ -66,13 +68,18 @@ export class Actions {
 
   button(action, sign, onclick) {
     const parts = [icon(sign), make("span", {}, NAMES[action])];
-    const made = make("button", { type: "button", class: "wide", onclick }, ...parts);
+    const press = () => {
+      const reason = made.getAttribute("title");
+      if (reason) this.say("warning", `${NAMES[action]}: ${reason[0].toLowerCase()}${reason.slice(1)}`);
+      else onclick();
+    };
+    const made = make("button", { type: "button", class: "wide", onclick: press }, ...parts);
     this.byAction[action] = made;
     return made;
   }
 
   /** Shows the buttons where acting is allowed, and locks those that would do nothing now, with the reason. */
-  show(scene, connected) {
+  show(scene, connected, old = false) {
     const allowed = scene?.may_act === true;
     const shown = allowed ? "all" : scene?.takes_actions === true ? "offer" : "none";
     if (shown !== this.shown) {
@@ -80,13 +87,13 @@ export class Actions {
       const parts = { all: [this.toast, this.confirm, this.buttons], offer: [this.offer], none: [] };
       this.bar.replaceChildren(...parts[shown]);
     }
-    const reasons = locks(this.model.frame, connected);
+    const reasons = locks(this.model.frame, connected, old);
     // What is asked is of the moment when it was asked.
     const goal = this.model.frame?.goal?.name;
     const locked = locks(this.model.frame, true)[this.asks];
     if (!this.confirm.hidden && (!allowed || goal !== this.asked || locked)) this.endAim();
     for (const [action, button] of Object.entries(this.byAction)) lock(button, reasons[action]);
-    this.yes.disabled = !connected;
+    this.yes.disabled = !connected || old;
   }
 
   act(action, place) {

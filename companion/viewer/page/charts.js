@@ -4,7 +4,7 @@ import uPlot from "viewer/uplot.js";
 import { theme } from "viewer/colours.js";
 import { make, setText } from "viewer/dom.js";
 import { KINDS } from "viewer/figures.js";
-import { elapsed, lasting, number } from "viewer/words.js";
+import { elapsed, lasting, number, UNKNOWN } from "viewer/words.js";
 
 const EVERY_MS = 500;
 const HEIGHT = 92;
@@ -108,8 +108,8 @@ export class Charts {
   }
 
   showValue(part, at) {
-    const value = Number.isInteger(at) ? part.plot?.data[1][at] : part.kind.of(this.model.frame ?? {});
-    setText(part.value, Number.isFinite(value) ? `${number(value, part.kind.digits)} ${part.kind.unit}` : "–");
+    const pointed = Number.isInteger(at) ? part.plot?.data[1][at] : undefined;
+    setText(part.value, valueOf(part.kind, this.model.frame, pointed));
   }
 
   /** Shows what is new, when it is time to. */
@@ -135,4 +135,11 @@ export class Charts {
     this.version = this.model.figures.version;
     for (const part of this.parts) part.plot?.setData(this.model.figures.series(part.index));
   }
+}
+
+/** What stands above a chart: the value `pointed` at, else that of now. After the end there is none. */
+export function valueOf(kind, frame, pointed) {
+  const now = frame?.state === "ended" ? null : kind.of(frame ?? {});
+  const value = pointed === undefined ? now : pointed;
+  return Number.isFinite(value) ? `${number(value, kind.digits)} ${kind.unit}` : UNKNOWN;
 }

@@ -6,11 +6,16 @@ const DRAWN = 2000;
 
 /** What is drawn: name, unit, and where it is in a frame. */
 export const KINDS = [
-  { name: "Speed", unit: "m/s", digits: 2, of: (frame) => frame.speed },
+  { name: "Speed", unit: "m/s", digits: 1, of: speedOf },
   { name: "Clearance", unit: "m", digits: 2, of: (frame) => frame.figures?.clearance_m },
   { name: "Planning", unit: "ms", digits: 1, of: (frame) => frame.figures?.planning_ms },
   { name: "Latency", unit: "ms", digits: 0, of: (frame) => frame.figures?.latency_ms },
 ];
+
+// Forwards or backwards; a millimetre of rolling back is no negative zero.
+function speedOf({ speed }) {
+  return Number.isFinite(speed) ? Math.abs(speed) : null;
+}
 
 export class Figures {
   constructor(keptS = KEPT_S) {

@@ -72,12 +72,18 @@ function reached({ statuses = [] }) {
   return statuses.filter((status) => status === "reached").length;
 }
 
-// While driving the second line says how far it still is; when standing it says why; in the end, what it came to.
+// While driving the second line says how far it still is, after why it hurries home or makes way; when standing it says
+// why; in the end, what it came to.
 function reason(frame, state) {
   if (!frame) return "";
-  if (frame.why) return sentence(frame.why);
+  if (state !== "driving" && frame.why) return sentence(frame.why);
   if (state === "ended") return frame.statuses?.length ? `${reached(frame)} of ${frame.statuses.length} targets reached` : "";
-  if (state !== "driving" || !frame.goal || !frame.pose) return "";
+  if (state !== "driving") return "";
+  return [sentence(frame.why), onTheWay(frame)].filter(Boolean).join(" · ");
+}
+
+function onTheWay(frame) {
+  if (!frame.goal || !frame.pose) return "";
   const rest = wayLeft(frame);
   const way = Number.isFinite(rest)
     ? `${metres(rest)} to go along the path`

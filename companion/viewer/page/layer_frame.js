@@ -7,10 +7,18 @@ const BAR_PX = 80;
 const LEFT = 16;
 /** Scale and colours together are about as wide as this. */
 const WIDTH = 290;
+/** The colours are so much higher where the buttons leave no room for both beside each other. */
+const ABOVE = 38;
 
 /** Takes their room, so no name lies below them. */
 export function claimFrame(pen) {
-  pen.taken.push([8, 12, 48, 48], [LEFT - 8, pen.camera.height - 42 - pen.camera.covered, WIDTH, 34]);
+  const above = isNarrow(pen.camera) ? ABOVE : 0;
+  const top = pen.camera.height - 42 - pen.camera.covered - above;
+  pen.taken.push([8, 12, 48, 48], [LEFT - 8, top, above ? WIDTH / 2 : WIDTH, 34 + above]);
+}
+
+function isNarrow(camera) {
+  return LEFT - 8 + WIDTH > camera.width - camera.coveredRight;
 }
 
 /** Draws them at the edges, above what covers the lower one. */
@@ -18,7 +26,9 @@ export function drawFrame(pen, model) {
   const bottom = pen.camera.height - 18 - pen.camera.covered;
   const right = drawScale(pen, bottom);
   drawNorth(pen);
-  if (model.track.points.length > 1) drawSpeeds(pen, model.track.topSpeed, right + 16, bottom - 7);
+  if (model.track.points.length < 2) return;
+  if (isNarrow(pen.camera)) drawSpeeds(pen, model.track.topSpeed, LEFT, bottom - 7 - ABOVE);
+  else drawSpeeds(pen, model.track.topSpeed, right + 16, bottom - 7);
 }
 
 /** Before the rover's first position there is nothing to draw: the map says so, and what is waited for. */

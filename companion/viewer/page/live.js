@@ -120,7 +120,8 @@ class LivePage {
     const { scene, frame } = this.model;
     const trouble = this.trouble();
     const lost = frame?.state !== "ended" && frame?.rates?.position_age_s > OLD_POSITION_S;
-    const silent = trouble !== "" || (frame !== null && this.silentFor() > STALE_MS);
+    const old = frame !== null && this.silentFor() > STALE_MS;
+    const silent = trouble !== "" || old;
     this.charts.stale = lost || silent;
     viewer.classList.toggle("stale", this.charts.stale);
     viewer.classList.toggle("lost", lost && !silent); // where it is, is old; mode and battery are not
@@ -132,7 +133,7 @@ class LivePage {
     legend.show(scene);
     this.panel.show();
     this.charts.show();
-    this.actions.show(scene, this.link?.open === true);
+    this.actions.show(scene, this.link?.open === true, old);
   }
 
   silentFor() {

@@ -138,7 +138,8 @@ function eventsOf(record) {
       else if (GIVEN_UP.has(status)) events.push({ t: frame.t, kind: "given-up", text: `${name}: ${status}` });
     });
     const stops = frame.state === "stopped" && before.state !== "stopped";
-    if (stops || (frame.state === "waiting" && before.state === "driving"))
+    const heldUp = Boolean(frame.held_up) && frame.held_up !== before.held_up;
+    if (stops || heldUp || (frame.state === "waiting" && before.state === "driving"))
       events.push({ t: frame.t, kind: "stop", text: frame.line, place: (frame.pose ?? before.pose)?.slice(0, 2) });
   });
   for (const contact of record.contacts)

@@ -72,9 +72,9 @@ def path_ahead(companion: Companion, north_m: float = 0.0, east_m: float = 0.0) 
     return np.empty((0, 2)) if path is None else path.points[path.progress :, :2] + (north_m, east_m)
 
 
-def headline_of(companion: Companion, status: Status) -> Headline:
+def headline_of(companion: Companion, status: Status, held_up: str = "") -> Headline:
     """In one line what is done, or why the rover stands and what it waits for; in the end, what it came to."""
-    doing = doing_of(companion, status)
+    doing = doing_of(companion, status, held_up)
     left = _left_m(companion, status) if status.activity.phase is RunPhase.DRIVING else None
     far = "" if left is None else f", {left:.0f} m straight"
     why = f", {doing['why']}" if doing["why"] else ""

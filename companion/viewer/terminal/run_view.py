@@ -18,6 +18,7 @@ from companion.app import Companion, Status
 from companion.core.frames import NedPoint, Pose
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import mode_of
+from companion.viewer.headway import Headway
 from companion.viewer.last_place import knows_place
 from companion.viewer.terminal.facts import Fact, Section
 from companion.viewer.terminal.known import headline_of, known_layers, mission_section, path_ahead, target_places
@@ -42,7 +43,7 @@ class RunView:
         """Where it was last known to be."""
         self._origin: object = None
         self._began_s: float | None = None
-        self._arrivals = Arrivals()
+        self._arrivals, self._headway = Arrivals(), Headway()
 
     @property
     def is_over(self) -> bool:
@@ -52,7 +53,9 @@ class RunView:
     def note(self, status: Status) -> None:
         """Keep the track, the news, and how often data arrive."""
         self._began_s = status.time_s if self._began_s is None else self._began_s
-        self._news += [f"{status.time_s - self._began_s:.0f} s: {one.text}" for one in status.news]
+        self._headway.note(self._companion, status)
+        texts = [*(one.text for one in status.news), *([self._headway.line] if self._headway.begins else ())]
+        self._news += [f"{status.time_s - self._began_s:.0f} s: {text}" for text in texts]
         self._arrivals.note(self._companion.vehicle)
         if self._companion.origin != self._origin:
             self._origin = self._companion.origin
@@ -82,7 +85,7 @@ class RunView:
         if executor is not None:
             home = executor.progress.home.point
             places = (Place("home", *_place(home), PlaceState.START), *target_places(executor.progress))
-        path, headline = path_ahead(companion), headline_of(companion, status)
+        path, headline = path_ahead(companion), headline_of(companion, status, self._headway.line)
         sections = (self._rover_section(status), mission_section(companion, status), self._link_section(status))
         news, evidence, name = tuple(self._news), companion.evidence, self._name
 

@@ -52,6 +52,8 @@ def test_the_first_doubt_stops_the_rover_and_is_told(tmp_path: Path) -> None:
     assert permitted.verdict() is Reaction.STOP and permitted.notices.texts[-1] == "Stopping: the companion is too slow"
     assert permitted.verdict(5.0) is Reaction.HOLD and permitted.notices.texts[-1] == "HOLD: the companion is too slow"
     assert permitted.run.latch.control is Control.PERSON
+    permitted.stand(0.0, 0.0, mode=HOLD)
+    assert permitted.verdict() is Reaction.SILENT and not permitted.run.taken_over, "this HOLD is the companion's own"
 
 
 def test_the_leg_begins_afresh_at_each_change_and_not_between(tmp_path: Path) -> None:
@@ -74,6 +76,9 @@ def test_a_companion_that_falls_silent_says_what_it_waits_for(tmp_path: Path) ->
     assert activity.awaited is not None and activity.awaited.kind is WaitReason.PERSON_SETS_MODE
     permitted.verdict()
     assert len(permitted.notices.told) == 1, "once"
+    assert permitted.run.taken_over, "somebody else has set this HOLD"
+    permitted.stand(0.0, 0.0)
+    assert permitted.verdict() is Reaction.DRIVE and not permitted.run.taken_over
 
 
 def test_a_pause_that_was_asked_for_was_told_then_and_is_not_told_again(tmp_path: Path) -> None:
@@ -82,7 +87,7 @@ def test_a_pause_that_was_asked_for_was_told_then_and_is_not_told_again(tmp_path
     permitted.stand(0.0, 0.0, mode=HOLD)
     permitted.run.paused = True
     assert permitted.verdict() is Reaction.SILENT
-    assert permitted.notices.texts == []
+    assert permitted.notices.texts == [] and not permitted.run.taken_over
     activity = permitted.run.activity
     assert activity.needs_person and str(activity) == (
         "stopped: paused on request, waiting for a person to ask it to go on, or to set GUIDED"

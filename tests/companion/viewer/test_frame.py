@@ -22,8 +22,10 @@ from companion.safety.reasons import Activity, Doubt, EndReason, LatchReason, Po
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.events import RoverMode
 from companion.viewer.frame import (
+    MAKES_WAY,
     MOST_PATH,
     MOST_RAYS,
+    SOMEBODY,
     _border,
     _outline,
     _places,
@@ -89,6 +91,7 @@ DONE, BY_USER = (Activity(RunPhase.ENDED, Reason(kind)) for kind in (EndReason.D
 LOW = Reason(PowerReason.LOW, ("battery",))
 ROLLS, PILOT = {"forward_m_s": 1.0}, {"mode": RoverMode.MANUAL}
 RESTARTED = {"restarted": True, "armed": False}
+TAKEN = {"taken_over": True}
 SHED = {"shed": TargetStatus.UNREACHABLE}
 
 
@@ -99,6 +102,8 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         (DRIVING, {"action": Action.BACKTRACK}, "going back to find another way to gate", ""),
         (DRIVING, {"makes_way": True}, "driving to gate", "making way for something that moves"),
         (DRIVING, {"broken_off": LOW}, "driving to gate", "battery low for the autopilot"),
+        (DRIVING, {"broken_off": LOW, "makes_way": True}, "driving to gate", f"{LOW}; {MAKES_WAY}"),
+        (DRIVING, {"broken_off": LOW, "held_up": "stuck"}, "stuck", "battery low for the autopilot"),
         (WAITING, {}, "waiting for arming", "asked for; the autopilot says if it refuses"),
         (HELD, {}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
         (BLINDED, {}, "stopped: range data silent for over 1 s", "waiting for good data and a person to set X"),
@@ -109,6 +114,8 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
             "waiting for a person to set X",
         ),
         (HELD, {**RESTARTED, "armed": True}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
+        (HELD, TAKEN, f"stopped: HOLD was set by {SOMEBODY}", "waiting for a person to set X"),
+        (HELD, {**PILOT, **TAKEN}, "the pilot drives (MANUAL)", "waiting for a person to set X"),
         (HELD, PILOT, "the pilot drives (MANUAL)", "waiting for a person to set X"),
         (DOUBTED, {}, "stopped: position wanders", ""),
         (DOUBTED, ROLLS, "stopping: position wanders", ""),
@@ -131,7 +138,10 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
         heartbeat=heartbeat, is_ours=False, forward_m_s=given.get("forward_m_s", 0.0),
         restarted=given.get("restarted", False),
     )  # fmt: skip
-    run = SimpleNamespace(stop=SimpleNamespace(reason=activity.reason), latch=SimpleNamespace(control=Control.PERSON))
+    run = SimpleNamespace(
+        stop=SimpleNamespace(reason=activity.reason), latch=SimpleNamespace(control=Control.PERSON),
+        taken_over=given.get("taken_over", False),
+    )  # fmt: skip
     statuses = [("gate", TargetStatus.REACHED), *((name, given[name]) for name in ("shed",) if name in given)]
     companion = SimpleNamespace(
         outcome=SimpleNamespace(broken_off=given.get("broken_off")), mission_run=run, vehicle=vehicle,
@@ -139,7 +149,7 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
     )  # fmt: skip
     decision = SimpleNamespace(action=given.get("action", Action.FOLLOW))
     status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=decision)
-    doing = doing_of(cast(Any, companion), cast(Any, status))
+    doing = doing_of(cast(Any, companion), cast(Any, status), given.get("held_up", ""))
     assert (doing["line"], doing["why"]) == (line, why)
 
 

@@ -173,21 +173,84 @@ tell(moments.map((one) => (headline.show({ live: true }, { ...frame, ...one }, "
     assert ran(tmp_path, DOCUMENT + script) == whole
 
 
+def test_why_a_rover_drives_otherwise_is_told_beside_how_far_it_is(tmp_path: Path) -> None:
+    script = """
+const { Headline } = await import("./headline.js");
+const headline = new Headline();
+const frame = {
+  state: "driving", t: 1, pose: [0, 0, 0], goal: { name: "home", place: [0, 12] }, speed: 0, why: "battery at 18 %",
+};
+const moments = [{ setpoint: { kind: "heading", heading: -0.14 } }, { goal: null }, { state: "stopped" }];
+tell(moments.map((one) => (headline.show({ live: true }, { ...frame, ...one }, "", true), headline.why.textContent)));
+"""
+    turns, without, stopped = ran(tmp_path, DOCUMENT + script)
+    assert turns == "Battery at 18 % · Turning to 352° · 12.0 m straight"
+    assert without == stopped == "Battery at 18 %"
+
+
+def test_what_holds_up_a_rover_that_is_led_is_marked_on_the_timeline(tmp_path: Path) -> None:
+    script = """
+globalThis.Path2D = class {};
+const { Record } = await import("./record.js");
+const frames = ["", "stuck", "stuck", "", "stuck"].map((held, t) => (
+  { t, state: "driving", line: held || "driving", held_up: held, pose: [t, 0, 0] }
+));
+tell(new Record({ scene: {}, frames }).events.map((one) => [one.t, one.kind, one.text, one.place]));
+"""
+    assert ran(tmp_path, script) == [[1, "stop", "stuck", [1, 0]], [4, "stop", "stuck", [4, 0]]]
+
+
 def test_a_button_that_would_do_nothing_is_locked_and_says_why(tmp_path: Path) -> None:
     script = """
 const { locks } = await import("./actions.js");
 const drives = { state: "driving", drives: "companion", goal: { name: "X" }, paused: false };
 tell([
   [drives, true], [drives, false], [{ ...drives, state: "ended" }, true], [{ ...drives, goal: null }, true],
-  [{ ...drives, drives: "nobody", paused: true }, true], [null, true],
+  [{ ...drives, drives: "nobody", paused: true }, true], [null, true], [{ ...drives, paused: true }, true, true],
 ].map((one) => locks(...one)));
 """
-    driving, lost, ended, without, paused, nothing = ran(tmp_path, DOCUMENT + script)
+    driving, lost, ended, without, paused, nothing, old = ran(tmp_path, DOCUMENT + script)
     assert driving == {"pause": "", "resume": "Not paused here", "skip": "", "goto": ""}
     assert set(lost.values()) == {"Not connected"} and set(ended.values()) == {"The run has ended"}
     assert without["skip"] == without["goto"] != "" and without["pause"] == ""
     assert paused == {"pause": "", "resume": "", "skip": "", "goto": "Only while the companion drives"}
+    assert old == {"pause": "", **dict.fromkeys(("resume", "skip", "goto"), "No data: what is shown here is old")}
     assert nothing["pause"] == "" and all(nothing[name] for name in ("resume", "skip", "goto"))
+
+
+def test_the_token_is_kept_for_the_tab_and_taken_out_of_the_address(tmp_path: Path) -> None:
+    script = """
+const kept = {};
+globalThis.sessionStorage = { getItem: (name) => kept[name] ?? null, setItem: (name, text) => { kept[name] = text; } };
+globalThis.location = { hash: "#token=a%2Bb", pathname: "/page", search: "?x=1" };
+const shown = [];
+globalThis.history = { replaceState: (state, title, address) => { shown.push(address); location.hash = ""; } };
+const { findToken } = await import("./token.js");
+tell([findToken(), findToken(), shown]);
+"""
+    assert ran(tmp_path, DOCUMENT + script) == ["a+b", "a+b", ["/page?x=1"]]
+
+
+def test_a_locked_button_that_is_pressed_says_why_and_does_nothing(tmp_path: Path) -> None:
+    script = """
+const { Actions } = await import("./actions.js");
+globalThis.setTimeout = () => {};
+const sent = [];
+const model = { frame: { state: "driving", drives: "companion", goal: { name: "X" }, paused: false, t: 1 } };
+const view = { above: [], invalidate() {} };
+const stage = { classList: { add() {}, remove() {} } };
+const actions = new Actions(new Element(), stage, model, view, { send: (one) => sent.push(one.action) });
+const { resume, pause } = actions.byAction;
+const press = (button) => (button.onclick(), actions.toast.textContent);
+actions.show({ may_act: true }, true);
+const locked = press(resume);
+model.frame.paused = true;
+actions.show({ may_act: true }, true);
+tell([locked, resume.getAttribute("aria-disabled"), press(resume), press(pause), sent]);
+"""
+    locked, freed, pressed, paused, sent = ran(tmp_path, DOCUMENT + script)
+    assert (locked, freed) == ("Go on: not paused here", None)
+    assert (pressed, paused, sent) == ("Go on: sent", "Pause: sent", ["resume", "pause"])
 
 
 def test_distances_and_the_last_speed_are_named_for_what_they_are(tmp_path: Path) -> None:
@@ -204,6 +267,21 @@ tell(moments.map((one) => readouts({ ...frame, ...one }).slice(0, 2).map((each) 
     assert straight == ["speed 0.4 m/s", "straight 12.0 m"] and along[1] == "along path 22.0 m"
     assert (without[1], simulator[1]) == ("to goal – ", "driven 88.3 m")
     assert (rolls[0], stands[0]) == ("last speed 0.4 m/s", "speed 0.0 m/s")
+
+
+def test_above_a_figure_stands_its_value_of_now_and_none_after_the_end(tmp_path: Path) -> None:
+    script = """
+const { writeFileSync } = await import("node:fs");
+writeFileSync("./uplot.js", "export default class {}");
+const { valueOf } = await import("./charts.js");
+const { KINDS } = await import("./figures.js");
+const of = (...given) => valueOf(KINDS[0], ...given);
+tell([
+  of({ speed: -0.01 }), of({ speed: -0.52 }), of({ speed: 0.4, state: "ended" }), of({ state: "ended" }, 0.4),
+  of({ speed: 0.4 }, null), of(null),
+]);
+"""
+    assert ran(tmp_path, DOCUMENT + script) == ["0.0 m/s", "0.5 m/s", "–", "0.4 m/s", "–", "–"]
 
 
 def test_a_simulator_lists_the_targets_of_the_mission_without_saying_what_became_of_them(tmp_path: Path) -> None:
@@ -227,3 +305,25 @@ const { radii } = await import("./layer_marks.js");
 tell(radii([[100, 50], [0, 0], [116, 50], [100, 50.5], [100, 200], [110, 218]]));
 """
     assert ran(tmp_path, DOCUMENT + script) == [6, 12, 7, 6, pytest.approx(9.3, abs=0.1), pytest.approx(9.3, abs=0.1)]
+
+
+@pytest.mark.parametrize(("width", "covered_right"), [(360, 66), (390, 123), (900, 70)])
+def test_scale_and_colours_of_the_track_lie_where_no_button_is(tmp_path: Path, width: int, covered_right: int) -> None:
+    script = """
+const { drawFrame } = await import("./layer_frame.js");
+const plates = [];
+const context = new Proxy({}, {
+  get: (_, name) => (...given) => { if (name === "roundRect") plates.push(given.slice(0, 4)); },
+  set: () => true,
+});
+const camera = { width: WIDTH, height: 400, coveredRight: COVERED, covered: 0, scale: 20, up: 0 };
+const nothing = () => {};
+const pen = { context, camera, colours: { speeds: Array(5) }, widthOf: () => 45, text: nothing, stroke: nothing };
+drawFrame({ ...pen, disc: nothing }, { track: { points: [1, 2], topSpeed: 1.5 } });
+tell(plates);
+"""
+    scale, colours = ran(tmp_path, script.replace("WIDTH", str(width)).replace("COVERED", str(covered_right)))
+    for left, _, wide, _ in (scale, colours):
+        assert left >= 0 and left + wide <= width - covered_right
+    beside = scale[0] + scale[2] <= colours[0]
+    assert beside if width - covered_right > 300 else colours[1] + colours[3] <= scale[1]

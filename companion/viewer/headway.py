@@ -1,0 +1,78 @@
+"""Whether a rover that is led gets on, and if not, why: to the companion it is driving all the while.
+
+Nouns: hindrance, headway.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from enum import Enum
+
+from companion.app import Companion, Status
+from companion.core.frames import Pose
+from companion.safety.reasons import RunPhase
+
+CIRCLES = ((0.3, 6.0), (1.0, 12.0))
+"""Metres and seconds: a rover that gets on has left a circle of this radius after this time. A turn on the spot, or a
+change of direction, takes less."""
+YIELDS = ((0.3, 3.0),)
+"""The same for one that makes way: it does not turn meanwhile."""
+MADE_WAY_S = 2.0
+"""Way that was made longer ago is not why the rover stands now."""
+
+
+class Hindrance(Enum):
+    """Why a rover that is led does not get on."""
+
+    STUCK = "stuck, looking for another way"
+    MAKES_WAY = "making way for something that moves"
+    HARDLY = "hardly any progress"
+
+
+class Headway:
+    """Watches one companion, tick by tick."""
+
+    def __init__(self) -> None:
+        self.hindrance: Hindrance | None = None
+        """Why it does not get on now; None where it does, or is not to drive."""
+        self.line = ""
+        """The same in words, with where it is to drive."""
+        self.begins = False
+        """Whether this tick is the first of it."""
+        self._centres: dict[float, Pose] = {}
+        self._made_way_s = -math.inf
+        self._stuck: int | None = None
+        """How often it had been stuck when it last knew where to drive."""
+
+    def note(self, companion: Companion, status: Status) -> None:
+        """To be called after each tick."""
+        before, self.hindrance = self.hindrance, self._look(companion, status)
+        where = " to" if self.hindrance is Hindrance.STUCK else ", heading for"
+        self.line = "" if self.hindrance is None else f"{self.hindrance.value}{where} {status.target}"
+        self.begins = self.hindrance not in (None, before)
+
+    def _look(self, companion: Companion, status: Status) -> Hindrance | None:
+        driver, pose = companion.driver, status.pose
+        if driver is None or pose is None or status.activity.phase is not RunPhase.DRIVING or not status.target:
+            self._centres, self._stuck = {}, None
+            return None
+        if self._stuck is None or driver.decision is not None:
+            self._stuck = driver.tally.stuck
+        if driver.makes_way:
+            self._made_way_s = status.time_s
+        if driver.tally.stuck > self._stuck:
+            self._centres = {}
+            return Hindrance.STUCK
+        made_way = status.time_s - self._made_way_s <= MADE_WAY_S
+        if not self._lingers(pose, status.time_s, YIELDS if made_way else CIRCLES):
+            return None
+        return Hindrance.MAKES_WAY if made_way else Hindrance.HARDLY
+
+    def _lingers(self, pose: Pose, time_s: float, circles: Sequence[tuple[float, float]]) -> bool:
+        """Whether it has not left one of the circles in time."""
+        for radius_m, _ in CIRCLES:
+            centre = self._centres.get(radius_m)
+            if centre is None or pose.point.distance_m(centre.point) >= radius_m:
+                self._centres[radius_m] = pose
+        return any(time_s - self._centres[radius_m].time_s >= limit_s for radius_m, limit_s in circles)
