@@ -189,6 +189,9 @@ def _maps(mission: Mission) -> list[str]:
     elif sitl is not None and sitl.world is not None:
         world = load_map(sitl.world, sitl.resolution_m or resolution_m)
         _check_inside(mission, world.resolution_m, world.width * world.resolution_m, world.height * world.resolution_m)
+        if sitl.start is not None and world.is_obstacle(sitl.start):
+            says = f"sitl.start: field {sitl.start.x}, {sitl.start.y} is an obstacle in {sitl.world}"
+            raise MissionError(f"{mission.source or mission.name}: {says}; choose a free field")
         lines.append(f"simulator's world: {sitl.world}: {_map_text(world)}")
     return lines
 

@@ -197,6 +197,7 @@ def test_what_drive_would_refuse_is_refused_here_too(tmp_path: Path) -> None:
             "lies outside the world",
         ),
         ('[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.png"\nstart = [30, 3]\n', "lies outside the world"),
+        ('[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.png"\nstart = [4, 3]\n', "4, 3 is an obstacle in"),
     ],
     ids=[
         "a world file",
@@ -204,11 +205,14 @@ def test_what_drive_would_refuse_is_refused_here_too(tmp_path: Path) -> None:
         "a decimal comma in a list",
         "a start outside a world file",
         "a start outside a picture",
+        "a start on a wall of a picture",
     ],
 )
 def test_mistakes_that_people_make_are_named(tmp_path: Path, text: str, says: str) -> None:
     (tmp_path / "w.toml").write_text("size_m = [40, 20]\n")
-    Image.new("L", (30, 20), 255).save(tmp_path / "w.png")
+    picture = Image.new("L", (30, 20), 255)
+    picture.putpixel((4, 16), 0)
+    picture.save(tmp_path / "w.png")
     path = tmp_path / "m.toml"
     path.write_text(text)
     result = CliRunner().invoke(app, ["mission", "check", str(path)])
