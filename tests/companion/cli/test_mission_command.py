@@ -220,6 +220,10 @@ def test_mistakes_that_people_make_are_named(tmp_path: Path, text: str, says: st
     assert says in result.output and result.output.startswith(str(path))
     inside = path.with_name("inside.toml")
     inside.write_text(
-        text.replace("200", "20").replace("30, 3", "29, 3").replace("18,0, 3", "18, 3").replace("18,0", "18.0")
+        text.replace("200", "20")
+        .replace("30, 3", "29, 3")
+        .replace("[4, 3]", "[5, 3]")
+        .replace("18,0, 3", "18, 3")
+        .replace("18,0", "18.0")
     )
     assert CliRunner().invoke(app, ["mission", "check", str(inside)]).exit_code == (2 if "size_m" in text else 0)
