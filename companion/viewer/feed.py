@@ -14,7 +14,6 @@ from typing import Any
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
-from companion.safety.reasons import EndReason
 from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of, told
@@ -129,10 +128,7 @@ class ViewerFeed:
     def _frame(self, status: Status) -> Json:
         executor = self._companion.executor
         self.steady.note(None if executor is None else executor.layout.origin)
-        frame = self.steady.frame(frame_of(self._companion, status, self._headway.line))
-        if self.ended_by and frame["state"] == "ended":
-            stopped = str(EndReason.STOPPED_BY_USER.value)
-            frame["line"] = frame["line"].replace(stopped, f"ended, {self.ended_by}", 1)
+        frame = self.steady.frame(frame_of(self._companion, status, self._headway.line, self.ended_by))
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
         frame["contacts"] = None if self.touched is None else len(self.touched)
         frame["touched"] = list((self.touched or ())[-TOUCHED_KEPT:])

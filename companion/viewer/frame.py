@@ -116,8 +116,12 @@ def scene_of(mission: Mission, run: MissionRun, epoch: int) -> Json:
     }
 
 
-def frame_of(companion: Companion, status: Status, held_up: str = "") -> Json:
-    """The moment. ``news`` are those of this tick alone. ``held_up``: why a rover that is led does not get on."""
+def frame_of(companion: Companion, status: Status, held_up: str = "", ended_by: str = "") -> Json:
+    """The moment. ``news`` are those of this tick alone.
+
+    ``held_up``: why a rover that is led does not get on. ``ended_by``: why the companion was told to stop, where it was
+    no person that did so.
+    """
     run, executor = companion.mission_run, companion.executor
     vehicle, now_s, pose = run.vehicle, status.time_s, status.pose
     return {
@@ -127,7 +131,7 @@ def frame_of(companion: Companion, status: Status, held_up: str = "") -> Json:
         "speed": None if vehicle.position is None else round(vehicle.forward_m_s, 3),
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
         **mode_of(vehicle, run),
-        **doing_of(companion, status, held_up),
+        **doing_of(companion, status, held_up, ended_by),
         "held_up": held_up,
         "statuses": [str(one) for _, one in run.statuses()],
         "goal": _goal(executor),
@@ -219,7 +223,7 @@ def _map(executor: MissionExecutor) -> Json:
     }
 
 
-def doing_of(companion: Companion, status: Status, held_up: str = "") -> Json:
+def doing_of(companion: Companion, status: Status, held_up: str = "", ended_by: str = "") -> Json:
     """One large line; then what is awaited where it says why the rover stands, or why it drives back."""
     activity, line, why = status.activity, status.doing, ""
     if activity.phase is RunPhase.DRIVING and status.target:
@@ -235,7 +239,8 @@ def doing_of(companion: Companion, status: Status, held_up: str = "") -> Json:
     elif state == "stopped" and abs(companion.vehicle.forward_m_s) > ROLLS_M_S:
         line = line.replace("stopped: ", "stopping: ", 1)
     elif state == "ended":
-        line, why = _ended(companion, line)
+        stopped = line == str(EndReason.STOPPED_BY_USER.value)
+        line, why = _ended(companion, f"ended, {ended_by}" if stopped and ended_by else line)
     return {"line": line, "why": why, "state": state}
 
 

@@ -34,6 +34,7 @@ from sitl.experiments.experiment import (
     Options,
     chosen_controllers,
     each,
+    section_by_rule,
     shipped_missions,
 )
 from sitl.experiments.off_model import scenario_off_model
@@ -197,9 +198,7 @@ class DeadReport(ExperimentReport):
     @property
     def section_name(self) -> str:
         """See ``ExperimentReport``."""
-        if self.options.guard:
-            return f"{NAME}-guarded"
-        return f"{NAME}-strict" if self._planned else NAME
+        return section_by_rule(NAME, self.options.guard, self._planned)
 
     @property
     def _planned(self) -> int:

@@ -152,6 +152,16 @@ class ExperimentReport(ABC):
         return [*files, write_section(folder, self.section_name, self.section(), self.page)]
 
 
+def section_by_rule(name: str, guard: bool, planned: int) -> str:
+    """The section's name of an experiment of which the results page has three: with points, guarded, and strict.
+
+    ``planned``: how many of its results are of planned motions.
+    """
+    if guard:
+        return f"{name}-guarded"
+    return f"{name}-strict" if planned else name
+
+
 @runtime_checkable
 class Checked(Protocol):
     """A report of something that may not happen."""

@@ -37,6 +37,7 @@ from sitl.experiments.experiment import (
     Options,
     chosen_controllers,
     each,
+    section_by_rule,
 )
 from sitl.experiments.off_model import scenario_off_model
 from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table
@@ -237,9 +238,7 @@ class KilledReport(ExperimentReport):
     @property
     def section_name(self) -> str:
         """See ``ExperimentReport``."""
-        if self.options.guard:
-            return f"{NAME}-guarded"
-        return f"{NAME}-strict" if self._planned else NAME
+        return section_by_rule(NAME, self.options.guard, self._planned)
 
     @property
     def _planned(self) -> int:
