@@ -30,6 +30,17 @@ SPEED_SHARE = {"lidar-360": 0.9, "lidar-90": 0.75}
 """Of the cruise speed. With a lidar range of 4.5 m a target is at most 3.9 m away: the autopilot drives 1.7 m/s."""
 MEASURED_S = 40.0
 
+NOTE_TICKS = """
+import time
+from companion.app import Companion
+def tick(self, plain=Companion.tick, noted=open({path!r}, "w", buffering=1)):
+    began_s = time.thread_time()
+    plain(self)
+    noted.write(f"{{self.outcome.tick_seconds[-1]}} {{time.thread_time() - began_s}}\\n")
+Companion.tick = tick
+"""
+"""Has a companion's process write down how long each of its ticks took, and how much of that it worked."""
+
 OPEN = """
 name = "Straight"
 [grid]
@@ -105,26 +116,35 @@ def test_mean_speed_on_open_straight_ground(tmp_path: Path, sensors: str) -> Non
     assert speed_m_s >= SPEED_SHARE.get(sensors, 0.0) * 2.0
 
 
-@pytest.mark.parametrize("controller", ["points", "motion-ga"])
-def test_memory_and_processor_in_real_time(tmp_path: Path, controller: str) -> None:
+@pytest.mark.parametrize("controller, guarded", [("points", False), ("motion-ga", False), ("motion-ga", True)])
+def test_memory_processor_and_ticks_in_real_time(tmp_path: Path, controller: str, guarded: bool) -> None:
     """The companion as a process of its own, driving through rooms at 15 scans a second."""
-    mission, settings = load_mission(MISSIONS / "rooms.toml"), tmp_path / "settings.toml"
+    mission, settings, ticks = load_mission(MISSIONS / "rooms.toml"), tmp_path / "settings.toml", tmp_path / "ticks"
     settings.write_text(f'[guidance]\ncontroller = "{controller}"\n')
     assert mission.source is not None
     asked = ("run", mission.source, "--settings", settings, "--arm")
-    with served(mission) as world, process("companion", *asked, "--connect", world.url) as run:
+    first = NOTE_TICKS.format(path=str(ticks))
+    with (
+        served(mission, GUARD if guarded else NONE) as world,
+        process("companion", *asked, "--connect", world.url, first=first) as run,
+    ):
         wait_until(lambda: world.simulator.driven_m > 1.0)
-        companion = psutil.Process(run.pid)
+        companion, skipped = psutil.Process(run.pid), len(ticks.read_text().splitlines())
         began_s, before = time.monotonic(), companion.cpu_times()
         time.sleep(MEASURED_S)
         after, elapsed_s = companion.cpu_times(), time.monotonic() - began_s
         memory_mb = companion.memory_info().rss / 1e6
         driven_m = world.simulator.driven_m
+        ticks_ms = 1e3 * np.loadtxt(ticks, skiprows=skipped)
     share = (after.user + after.system - before.user - before.system) / elapsed_s
+    (p50_ms, worked50_ms), (p99_ms, worked99_ms) = np.percentile(ticks_ms, (50, 99), axis=0)
     print(
-        f"\nreal time, {controller}: {memory_mb:.0f} MB, {100.0 * share:.1f} % of one core over {elapsed_s:.0f} s, "
-        f"{driven_m:.0f} m driven"
+        f"\nreal time, {controller}, {'guarded' if guarded else 'no guard'}: {memory_mb:.0f} MB, {100.0 * share:.1f} % "
+        f"of one core over {elapsed_s:.0f} s, {driven_m:.0f} m driven; "
+        f"{len(ticks_ms)} ticks: median {p50_ms:.2f} ms, p99 {p99_ms:.2f} ms; "
+        f"of that work: median {worked50_ms:.2f} ms, p99 {worked99_ms:.2f} ms"
     )
     assert driven_m > 5.0
     assert memory_mb < (MEMORY_LIMIT_MB if controller == "points" else PLANNED_MEMORY_LIMIT_MB)
     assert share < (CPU_LIMIT if controller == "points" else PLANNED_CPU_LIMIT)
+    assert worked99_ms < PLANNED_TICK_LIMIT_MS

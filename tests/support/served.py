@@ -8,8 +8,9 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -41,9 +42,11 @@ planner_s = 120.0
 class Served:
     """The simulator runs in a thread in real time; it has been switched on long enough to be armed."""
 
-    def __init__(self, mission: Mission, *more: str) -> None:
-        """``more``: addresses to listen on besides TCP."""
-        self.simulator: Simulator = scenario_from_mission(mission).simulator(0)
+    def __init__(self, mission: Mission, *more: str, parameters: Mapping[str, float] | None = None) -> None:
+        """``more``: addresses to listen on besides TCP. ``parameters``: of the autopilot, besides the mission's."""
+        scenario = scenario_from_mission(mission)
+        scenario = replace(scenario, parameters={**scenario.parameters, **(parameters or {})})
+        self.simulator: Simulator = scenario.simulator(0)
         self.simulator.advance_to_s(READY_S)
         self.url = f"tcp:127.0.0.1:{free_port()}"
         self._endpoints = [
@@ -182,8 +185,8 @@ def finished(child: Forked | subprocess.Popen[str]) -> tuple[int, str, str]:
 
 
 @contextmanager
-def served(mission: Mission) -> Iterator[Served]:
-    world = Served(mission)
+def served(mission: Mission, parameters: Mapping[str, float] | None = None) -> Iterator[Served]:
+    world = Served(mission, parameters=parameters)
     try:
         yield world
     finally:
