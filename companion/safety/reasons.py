@@ -127,6 +127,10 @@ class EndReason(Enum):
 
     DONE = "done"
     STOPPED_BY_USER = "stopped by the user"
+    NOBODY_HERE = "nobody is here to do what the companion waits for"
+    NEVER_BEGINS = "{} since the start; it cannot be expected any more"
+    TIME_LIMIT = "time limit reached"
+    """Of a simulated drive, as the two before."""
     ERROR = "error"
     BATTERY = "{}"
 

@@ -25,6 +25,7 @@ from companion.cli.commands import app
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
 from companion.replay.replay import Observers, replay
+from companion.safety.reasons import EndReason
 from companion.viewer import frame, map_tiles, report_data, report_mcap
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
 from companion.viewer.frame import doing_of
@@ -454,6 +455,6 @@ def test_a_report_reaches_the_last_moment_of_a_drive_that_was_broken_off_and_say
     assert [state for _, state in states][-3:] == ["driving", "stopped", "driving"]
     assert states[-1][0] - states[-2][0] == pytest.approx(0.05)
     assert len(times) < run.result.seconds / 0.4 + 5
-    record.meta.stopped_by_user = True
+    record.meta.ended_by = EndReason.STOPPED_BY_USER.name
     last = joined(record, watched, run, [])["frames"][-1]
-    assert (last["state"], last["line"], last["t"]) == ("ended", "stopped by the user", times[-1])
+    assert (last["state"], last["t"]) == ("ended", times[-1]) and last["line"].startswith("stopped by the user: ")

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from companion.cli.web import served, web_viewer
+from companion.safety.reasons import EndReason
 from companion.viewer.live_viewer import LiveViewer
 from companion.viewer.web_process import WebError, WebPlace
 from tests.companion.viewer.test_feed import new_drive
@@ -33,8 +34,8 @@ def test_a_fault_at_the_end_is_told_and_keeps_nothing_from_being_closed(monkeypa
     try:
         viewer.follow(run.companion, run.settings, simulated=True)
         monkeypatch.setattr(run.companion, "status", lambda: 1 / 0)
-        viewer.end("stopped by the user")
-        viewer.end("stopped by the user")
+        viewer.end(EndReason.STOPPED_BY_USER)
+        viewer.end(EndReason.STOPPED_BY_USER)
     finally:
         viewer.close()
     assert told == ["the page is not told how the run ended: ZeroDivisionError: division by zero"]
