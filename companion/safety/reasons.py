@@ -131,7 +131,9 @@ class EndReason(Enum):
     NEVER_BEGINS = "{} since the start; it cannot be expected any more"
     TIME_LIMIT = "time limit reached"
     """Of a simulated drive, as the two before."""
-    ERROR = "error"
+    ERROR = "an error in the program"
+    GONE = "the companion's program is gone: killed, or crashed"
+    """As the process of the page sees it."""
     BATTERY = "{}"
 
 

@@ -83,11 +83,11 @@ class ViewerFeed:
 
     def end(self, reason: EndReason) -> None:
         """The last moment, of a run that ended otherwise than by itself."""
-        status = self._companion.status()
-        frame = self._frame(status)
-        line, why = ending_of(self._companion, Reason(reason))
-        last = {**frame, "news": self._news, "state": "ended", "line": line, "why": why}
-        if frame["state"] != "ended" and self._put(last):
+        frame = self._frame(self._companion.status())
+        if frame["state"] != "ended":
+            line, why = ending_of(self._companion, Reason(reason))
+            frame.update(state="ended", line=line, why=why)
+        if self._put({**frame, "news": self._news}):
             self._news = []
 
     def _tell_scene(self, now_s: float) -> None:

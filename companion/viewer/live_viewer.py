@@ -21,6 +21,9 @@ from companion.viewer.map_tiles import warm_up
 from companion.viewer.page_requests import PageRequests
 from companion.viewer.web_process import WebPlace, WebProcess
 
+MOST_ERROR = 300
+"""So many letters of an error are told."""
+
 
 class LiveViewer:
     """``web`` is there before the companion, so that a place that cannot be served is told first.
@@ -105,6 +108,12 @@ class LiveViewer:
         except Exception as error:  # record and report have still to be closed
             self._feed = None
             self._say(f"the page is not told how the run ended: {type(error).__name__}: {error}")
+
+    def fail(self, error: BaseException) -> None:
+        """Tell that an error has ended the program, and which. To be called once the rover has been stopped."""
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        self.warn(f"An error has ended the program: {what:.{MOST_ERROR}}")
+        self.end(EndReason.ERROR)
 
     def close(self) -> None:
         """Tell the last moment, and end."""

@@ -138,6 +138,9 @@ def drive(
         _end(page, EndReason.STOPPED_BY_USER)
         _keep(run, recorder)
         raise StoppedError(_stopped(run, recorder if record else NullRecorder())) from None
+    except Exception as error:
+        _fail(page, error)
+        raise
     finally:
         _closed(page)
     recorder.close(ended_by=run.ended_by(EndReason.TIME_LIMIT))
@@ -237,6 +240,11 @@ def _end(page: LiveViewer | None, reason: EndReason) -> None:
     """How it ended, for the page, where the companion did not end it."""
     if page is not None:
         page.end(reason)
+
+
+def _fail(page: LiveViewer | None, error: Exception) -> None:
+    if page is not None:
+        page.fail(error)
 
 
 def _closed(page: LiveViewer | None) -> None:

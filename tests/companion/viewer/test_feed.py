@@ -116,6 +116,20 @@ def test_a_run_that_is_broken_off_says_by_what() -> None:
     assert last["why"].endswith(": not reached")
 
 
+@pytest.mark.usefixtures("every_tick")
+def test_a_run_that_an_error_has_ended_says_so_after_the_rover_was_stopped() -> None:
+    run, heard = new_drive("points"), Heard()
+    watched = ViewerFeed(run.companion, heard, {})
+    run.companion.tick()
+    watched.show(run.take_status())
+    run.companion.close()
+    watched.warn("what it was")
+    watched.end(EndReason.ERROR)
+    last = heard.frames[-1]
+    assert (last["state"], last["line"]) == ("ended", "ended, an error in the program: 0 of 1 targets reached")
+    assert last["news"][-1]["text"] == "what it was"
+
+
 @pytest.mark.thorough
 @pytest.mark.usefixtures("every_tick")
 def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_new_one_everything() -> None:
