@@ -202,7 +202,7 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             assert [fault for fault in desktop.faults if "WebSocket" not in fault and "ERR_" not in fault] == []
             desktop.press("Pause")
             desktop.shows("HOLD", "Paused on request")
-            assert "Companion silent" not in desktop.text, "it is told once"
+            assert "no longer steers" not in desktop.text, "it is told once"
             desktop.press("Go on")
             desktop.shows("GUIDED", "Going on as requested", "Go on: done")
             for _ in range(4):
