@@ -75,7 +75,7 @@ for (let i = 0; i < w * Math.floor(0.9 * h); i++) {  // below is the scale of co
 return [n, x / n, y / n]
 """
 """How many pixels of the map have this colour, and where the middle of them is."""
-LIGHT = {"unknown": "#9fa9b3", "free": "#ffffff", "obstacle": "#12181e", "rover": "#e04a00"}
+LIGHT = {"unknown": "#9fa9b3", "free": "#ffffff", "obstacle": "#12181e", "rover": "#cc4200"}
 DARK = {"unknown": "#101418", "free": "#4b5864", "obstacle": "#f3f6f8", "rover": "#ff7a33"}
 """Of the map, as the legend shows them."""
 FAST = "#5cb531"
