@@ -12,9 +12,10 @@ from companion.safety.reasons import EndReason
 from companion.viewer.live_viewer import LiveViewer
 from companion.viewer.web_process import WebError, WebPlace
 from tests.companion.viewer.test_feed import new_drive
+from tests.support.quick import first_of
 
 
-@pytest.mark.parametrize("time_s", [math.nan, math.inf])
+@first_of(1, "time_s", [math.nan, math.inf])
 def test_a_fault_of_the_picture_is_told_once_and_the_drive_goes_on(time_s: float) -> None:
     told: list[str] = []
     viewer, run = LiveViewer(WebPlace("127.0.0.1", 0), told.append), new_drive("points")
