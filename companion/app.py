@@ -25,6 +25,7 @@ from companion.mission.mission import Mission
 from companion.navigation.step_runner import StepRunner
 from companion.operator.notifications import News, Outcome, Status, status_of
 from companion.recording.recorder import RunLog
+from companion.safety.reasons import EndReason
 from companion.settings import Settings
 from companion.supervision.assembly import Options, assemble
 from companion.vehicle.state import VehicleState
@@ -87,9 +88,9 @@ class Companion:
             observe(self.status())
         return self.outcome
 
-    def stop(self) -> None:
+    def stop(self, why: EndReason = EndReason.STOPPED_BY_USER) -> None:
         """Ask for an orderly end at the next tick: the rover is stopped and put into HOLD. Safe in a signal handler."""
-        self._supervisor.stop()
+        self._supervisor.stop(why)
 
     def close(self) -> None:
         """The way out after an error: a rover that is ours is stopped and put into HOLD before this returns."""

@@ -29,6 +29,7 @@ from companion.mission.mission import Mission
 from companion.navigation.step_runner import InlineRunner
 from companion.operator.notifications import News
 from companion.recording.recorder import NullRecorder, Recorder
+from companion.safety.reasons import EndReason
 from companion.settings import Settings
 from sitl.scenario import Scenario
 from sitl.sensors.serial_lidar import SerialLidar
@@ -262,6 +263,11 @@ class Drive:
         self.report.wall_time_s = stopwatch_s() - began_s
         self._sum_up()
         return self.report
+
+    def ended_by(self, broken_off: EndReason) -> EndReason:
+        """Why the companion has ended the run; ``broken_off``, where it has not."""
+        end = self.companion.mission_run.end
+        return broken_off if end is None else end.kind
 
     @property
     def contacts(self) -> list[dict[str, float | str]]:

@@ -289,6 +289,11 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
             if not rig.stop.asked:
                 rig.budget.extend(UNHURRIED_S)
                 rig.live.unhurried(UNHURRIED_S)
+        except Exception as error:
+            companion.close()  # the rover first
+            if rig.page is not None:
+                rig.page.fail(error)
+            raise
         finally:
             service.stopping()
             companion.close()

@@ -221,7 +221,9 @@ class MissionExecutor:
         moved_m = apart_m(origin, self.layout.origin)
         if moved_m <= ORIGIN_MOVED_M:
             return False
-        self._notifier.tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", Severity.WARNING)
+        self._notifier.tell(
+            f"The autopilot has moved its origin by {moved_m:.1f} m: mission laid out anew", Severity.WARNING
+        )
         self.maps_begun += 1
         mapping = self._given.mapping
         self.layout, self.progress = lay_again(
@@ -552,7 +554,7 @@ class MissionExecutor:
         side_m = evidence.base.resolution_m
         if size is not None and side_m > 1.01 * size.fine_m:
             gap_m = sure_gap_m(rover, evidence.settings, side_m)
-            text = f"Fields of {side_m:.2g} m may close gaps below {gap_m:.1f} m; smaller ones open more"
+            text = f"Map fields of {side_m:.2g} m may close gaps below {gap_m:.1f} m; smaller ones open more"
             self._notifier.tell(text, Severity.INFO)
 
     def _take_decision(self, decision: Decision, at: NedPoint, now_s: float) -> None:

@@ -124,7 +124,7 @@ class Notifier:
         if run.latch.control is not Control.COMPANION or self._autopilot.target_confirmed is not False:
             self._followed_s = now_s
         elif now_s - self._followed_s > NOT_FOLLOWED_S:
-            self.once("The autopilot follows another target than the one sent")
+            self.once("The autopilot follows another target than the one sent: does another program steer it?")
         for text in self.lasting_faults(self._autopilot.rate_faults, problem, now_s):
             self.once(text)
 

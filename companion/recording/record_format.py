@@ -15,6 +15,7 @@ from typing import NamedTuple
 from pydantic import BaseModel, ConfigDict
 
 from companion.navigation.field_step import Decision
+from companion.safety.reasons import EndReason
 
 FORMAT, WITH_LIDARS = 3, 4
 """Of the whole directory, without and with lidars on the companion's own ports. A reader refuses others."""
@@ -56,7 +57,7 @@ class FileLength(BaseModel):
 class RecordMeta(BaseModel):
     """``meta.json``. ``end``: by file name; None until the record is closed. ``lidars``: as they were given.
 
-    ``stopped_by_user``: the run was broken off, and the companion had no time to end it.
+    ``ended_by``: why a simulated drive ended, by the name of the reason; empty: not known.
     """
 
     model_config = ConfigDict(extra="ignore")
@@ -73,7 +74,12 @@ class RecordMeta(BaseModel):
     versions: dict[str, str]
     inputs: list[InputFile]
     end: dict[str, FileLength] | None
-    stopped_by_user: bool = False
+    ended_by: str = ""
+
+    @property
+    def end_reason(self) -> EndReason | None:
+        """Why a simulated drive ended. None: the run itself tells it."""
+        return EndReason.__members__.get(self.ended_by)
 
 
 class LidarEntry(NamedTuple):

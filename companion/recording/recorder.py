@@ -44,6 +44,7 @@ from companion.recording.record_format import (
     run_sum,
     settings_sum,
 )
+from companion.safety.reasons import EndReason
 from companion.settings import Settings
 from companion.settings.versions import versions
 from companion.storage.background_writer import BackgroundWorker, Job
@@ -97,7 +98,7 @@ class NullRecorder:
     def mark(self, mark: Mark) -> None:
         """Ignored."""
 
-    def close(self, *, stopped_by_user: bool = False) -> None:
+    def close(self, *, ended_by: EndReason | None = None) -> None:
         """Nothing to close."""
 
 
@@ -211,14 +212,14 @@ class Recorder:
         """One line of JSON."""
         self._write(DECISIONS, decision_line(time_s, target, decision).encode() + b"\n")
 
-    def close(self, *, stopped_by_user: bool = False) -> None:
+    def close(self, *, ended_by: EndReason | None = None) -> None:
         """Write what is left, and mark the record complete. Gives up on a disk that hangs. May be called again.
 
-        ``stopped_by_user``: the run was broken off before the companion could end it.
+        ``ended_by``: why, of a simulated drive, which may be broken off before the companion can end it.
         """
         if self._closed:
             return
-        self._meta.stopped_by_user = stopped_by_user
+        self._meta.ended_by = "" if ended_by is None else ended_by.name
         self._end_tick()
         self._hand_over()
         self._closed = True

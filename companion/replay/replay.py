@@ -29,6 +29,7 @@ from companion.navigation.field_step import Decision, NavState
 from companion.navigation.step_runner import StepCall
 from companion.recording.reader import Record, RecordedTick
 from companion.recording.record_format import STATE, LidarEntry, RecordError, TickEntry, decision_line
+from companion.safety.reasons import EndReason
 from companion.storage.files import read_at_most
 
 Answer = tuple[NavState, Decision]
@@ -86,6 +87,11 @@ class RecordPlayer:
     def next_marks(self) -> Mark | None:
         """Marks of the next tick; None if there is none left."""
         return None if self._next is None else Mark(self._next.entry.marks)
+
+    @property
+    def stopped_by(self) -> EndReason:
+        """What asked the run to stop, where its ticks say that something did."""
+        return self._record.meta.end_reason or EndReason.STOPPED_BY_USER
 
     def advance(self) -> None:
         """Go to the next tick. Raises EndOfRecordError."""
@@ -380,7 +386,7 @@ def _tick(companion: Companion, player: RecordPlayer) -> bool:
         companion.close()
         return True
     if marks & Mark.STOP:
-        companion.stop()
+        companion.stop(player.stopped_by)
     try:
         companion.tick()
     except EndOfRecordError:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from companion.checkpoint.resume import PreviousRun, ResumePermission, resume_permission, resumed_layout, same_boot
 from companion.control.controller import STANDSTILL
 from companion.core.severity import Severity
+from companion.executive.command_sender import result_text
 from companion.executive.controller_choice import settings_in_force
 from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import MissionProgress, plan_progress
@@ -224,7 +225,7 @@ class Arming:
         refused = self._autopilot.last_ack(Arm())
         arming = self._awaited is not None and self._awaited.kind is WaitReason.ARMING
         if refused is not None and refused.result != 0 and arming:
-            self._notifier.once(f"The autopilot refuses to arm (result {refused.result})")
+            self._notifier.once(f"The autopilot refuses to arm ({result_text(refused.result)}): its own texts say why")
         self._run.awaited = self._awaited
 
     # Whose rover it is -------------------------------------------------------------------------------------------

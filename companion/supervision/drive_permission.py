@@ -10,7 +10,7 @@ from dataclasses import replace
 from companion.core.severity import Severity, TextSink
 from companion.executive.mission_run import MissionRun, Stop
 from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched
-from companion.safety.reasons import LatchReason, Reason, WaitReason
+from companion.safety.reasons import FOR_A_PERSON, LatchReason, Reason, WaitReason
 from companion.safety.watchdogs import Monitor, first_doubt
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events import Event
@@ -73,9 +73,18 @@ class DrivePermission:
             case _ if (
                 before is Control.COMPANION and not self._run.paused
             ):  # a pause has been told when it was asked for
-                self._notifier.tell(f"Companion silent: {verdict.reason}", Severity.WARNING)
+                to_do = _for_person(self._run.stop)
+                self._notifier.tell(f"Companion no longer steers: {verdict.reason}{to_do}", Severity.WARNING)
             case _:
                 pass
+
+
+def _for_person(stop: Stop | None) -> str:
+    """What a person is to do; not what data is awaited, which changes from tick to tick."""
+    awaited = None if stop is None else stop.awaited
+    person = awaited.figures[1] if awaited is not None and awaited.kind is WaitReason.GOOD_DATA_AND else awaited
+    to_do = isinstance(person, Reason) and person.kind in FOR_A_PERSON
+    return f"; it waits for {person}" if to_do else ""
 
 
 def _is_taken(verdict: Verdict, before: Control) -> bool:

@@ -53,11 +53,11 @@ class Supervisor:
         self._log = log
         self._notifier = notifier
         self._outcome = outcome
-        self._stop_asked = False
+        self._stop_asked: EndReason | None = None
 
-    def stop(self) -> None:
+    def stop(self, why: EndReason) -> None:
         """Ask for an orderly end at the next tick. Safe in a signal handler."""
-        self._stop_asked = True
+        self._stop_asked = why
 
     def supervise(self, now_s: float) -> Verdict:
         """Go on with arming, mission or shutdown, whichever it is, and say what the rover may do in this tick.
@@ -66,9 +66,10 @@ class Supervisor:
         """
         for monitor in self._monitors:
             monitor.tick(now_s)
-        if self._stop_asked and self._run.end is None:
+        if self._stop_asked is not None and self._run.end is None:
             self._log.mark(Mark.STOP)
-            self._shutdown.begin(Reason(EndReason.STOPPED_BY_USER), now_s)
+            figures = (str(self._run.activity),) if self._stop_asked is EndReason.NEVER_BEGINS else ()
+            self._shutdown.begin(Reason(self._stop_asked, figures), now_s)
         if self._run.end is not None:
             self.done = self.done or self._shutdown.is_over(now_s)
             return SILENT

@@ -14,9 +14,10 @@ from typing import Any
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
+from companion.safety.reasons import EndReason, Reason
 from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
-from companion.viewer.frame import frame_of, news_of, scene_of, told
+from companion.viewer.frame import ending_of, frame_of, news_of, scene_of, told
 from companion.viewer.headway import Headway
 from companion.viewer.last_place import LastPlace
 from companion.viewer.map_tiles import TileWatch
@@ -49,8 +50,6 @@ class ViewerFeed:
         self.steady = SteadyFrame()
         self.touched: Sequence[Sequence[float]] | None = None
         """Where a simulated rover touched something, north and east; whoever knows it writes it here."""
-        self.ended_by = ""
-        """Why the companion was told to stop, where it was no person that did so."""
 
     def warn(self, text: str) -> None:
         """Something bad that the companion does not know of."""
@@ -82,12 +81,13 @@ class ViewerFeed:
         self._news = [*self._news, *news][-NEWS_KEPT:]
         self._retelling.past.news.extend(news)
 
-    def end(self, line: str) -> None:
-        """The last moment, of a run that ended otherwise than by itself. ``line``: how."""
-        status = self._companion.status()
-        frame = self._frame(status)
-        last = {**frame, "news": self._news, "state": "ended", "line": line, "why": ""}
-        if frame["state"] != "ended" and self._put(last):
+    def end(self, reason: EndReason) -> None:
+        """The last moment, of a run that ended otherwise than by itself."""
+        frame = self._frame(self._companion.status())
+        if frame["state"] != "ended":
+            line, why = ending_of(self._companion, Reason(reason))
+            frame.update(state="ended", line=line, why=why)
+        if self._put({**frame, "news": self._news}):
             self._news = []
 
     def _tell_scene(self, now_s: float) -> None:
@@ -128,7 +128,7 @@ class ViewerFeed:
     def _frame(self, status: Status) -> Json:
         executor = self._companion.executor
         self.steady.note(None if executor is None else executor.layout.origin)
-        frame = self.steady.frame(frame_of(self._companion, status, self._headway.line, self.ended_by))
+        frame = self.steady.frame(frame_of(self._companion, status, self._headway.line))
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
         frame["contacts"] = None if self.touched is None else len(self.touched)
         frame["touched"] = list((self.touched or ())[-TOUCHED_KEPT:])

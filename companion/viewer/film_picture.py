@@ -35,15 +35,15 @@ BAR_PIXELS, TEXT_PIXELS, NAME_PIXELS = 30, 15, 13
 LEAST_ROVER_PIXELS = 7.0
 ARROW = ((12.0, 0.0), (-8.0, 8.0), (-4.0, 0.0), (-8.0, -8.0))
 """Ahead and to the right, in pixels."""
-INK, HALO, ROVER, PATH = (13, 19, 25), (255, 255, 255), (224, 74, 0), (224, 74, 0)
+INK, HALO, ROVER, PATH = (13, 19, 25), (255, 255, 255), (204, 66, 0), (204, 66, 0)
 TRACK, BORDER, GOAL, REACHED = (31, 122, 148), (142, 42, 107), (224, 140, 0), (0, 102, 90)
 CONTACT, MOVER = (168, 32, 13), (106, 63, 192)
 MARKS: dict[str, tuple[int, int, int]] = {TargetStatus.REACHED: REACHED, TargetStatus.UNREACHABLE: CONTACT}
 """Colours of targets by what has become of them; GOAL for all others."""
 STATES = {
-    "driving": ((11, 92, 173), HALO),
+    "driving": ((10, 86, 163), HALO),
     "waiting": ((255, 197, 49), (22, 16, 0)),
-    "stopped": ((179, 34, 12), HALO),
+    "stopped": ((168, 31, 11), HALO),
 }
 OTHERWISE = ((51, 65, 78), HALO)
 """Background and text of the line, by what the rover does."""

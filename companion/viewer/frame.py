@@ -9,6 +9,7 @@ Nouns: scene, frame.
 from __future__ import annotations
 
 import math
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from companion.mission.bounds import Bound
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Action
 from companion.safety.mode_latch import Control
-from companion.safety.reasons import Activity, EndReason, LatchReason, RunPhase, WaitReason
+from companion.safety.reasons import Activity, EndReason, LatchReason, Reason, RunPhase, WaitReason
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.events import RoverMode
 from companion.vehicle.state import VehicleState
@@ -55,6 +56,8 @@ RESTARTED = "autopilot restarted, rover disarmed"
 SOMEBODY = "a person, or by the autopilot itself"
 BY_MODE = (WaitReason.PERSON_SETS_MODE, WaitReason.PERSON_SETS_MODE_AND_ARMS)
 MAKES_WAY, SEPARATOR = str(Hindrance.MAKES_WAY.value), "; "
+PLAIN_ENDS = (EndReason.DONE, EndReason.STOPPED_BY_USER)
+"""The others are told as what ended the run."""
 NOT_REACHED = {TargetStatus.PENDING: "not reached"}
 NEWEST_S = 0.5
 """A scan or a planned motion that is older is not shown."""
@@ -116,11 +119,10 @@ def scene_of(mission: Mission, run: MissionRun, epoch: int) -> Json:
     }
 
 
-def frame_of(companion: Companion, status: Status, held_up: str = "", ended_by: str = "") -> Json:
+def frame_of(companion: Companion, status: Status, held_up: str = "") -> Json:
     """The moment. ``news`` are those of this tick alone.
 
-    ``held_up``: why a rover that is led does not get on. ``ended_by``: why the companion was told to stop, where it was
-    no person that did so.
+    ``held_up``: why a rover that is led does not get on.
     """
     run, executor = companion.mission_run, companion.executor
     vehicle, now_s, pose = run.vehicle, status.time_s, status.pose
@@ -131,7 +133,7 @@ def frame_of(companion: Companion, status: Status, held_up: str = "", ended_by: 
         "speed": None if vehicle.position is None else round(vehicle.forward_m_s, 3),
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
         **mode_of(vehicle, run),
-        **doing_of(companion, status, held_up, ended_by),
+        **doing_of(companion, status, held_up),
         "held_up": held_up,
         "statuses": [str(one) for _, one in run.statuses()],
         "goal": _goal(executor),
@@ -223,7 +225,7 @@ def _map(executor: MissionExecutor) -> Json:
     }
 
 
-def doing_of(companion: Companion, status: Status, held_up: str = "", ended_by: str = "") -> Json:
+def doing_of(companion: Companion, status: Status, held_up: str = "") -> Json:
     """One large line; then what is awaited where it says why the rover stands, or why it drives back."""
     activity, line, why = status.activity, status.doing, ""
     if activity.phase is RunPhase.DRIVING and status.target:
@@ -238,9 +240,8 @@ def doing_of(companion: Companion, status: Status, held_up: str = "", ended_by: 
         line, state = other, "waiting"
     elif state == "stopped" and abs(companion.vehicle.forward_m_s) > ROLLS_M_S:
         line = line.replace("stopped: ", "stopping: ", 1)
-    elif state == "ended":
-        stopped = line == str(EndReason.STOPPED_BY_USER.value)
-        line, why = _ended(companion, f"ended, {ended_by}" if stopped and ended_by else line)
+    elif activity.phase is RunPhase.ENDED and activity.reason is not None:
+        line, why = ending_of(companion, activity.reason)
     return {"line": line, "why": why, "state": state}
 
 
@@ -282,15 +283,16 @@ def _driven_by(companion: Companion) -> str:
     return "" if driver in ("nobody", "companion") else f"the {driver} drives ({mode_name(vehicle)})"
 
 
-def _ended(companion: Companion, line: str) -> tuple[str, str]:
+def ending_of(companion: Companion, reason: Reason[Enum]) -> tuple[str, str]:
     """How it ended; where not every target was reached, which were not."""
+    line = str(reason) if reason.kind in PLAIN_ENDS else f"ended, {reason}"
     statuses = companion.statuses()
     missed = [f"{name}: {NOT_REACHED.get(status, status)}" for name, status in statuses if status != REACHED]
     if not missed:
         return line, ""
     more = f", and {len(missed) - MOST_MISSED} more" if len(missed) > MOST_MISSED else ""
     early = companion.outcome.broken_off
-    if line == str(EndReason.DONE.value):
+    if reason.kind is EndReason.DONE:
         line = "ended" if early is None else f"ended early, {early}"
     reached = f"{len(statuses) - len(missed)} of {len(statuses)} targets reached"
     return f"{line}: {reached}", ", ".join(missed[:MOST_MISSED]) + more

@@ -12,12 +12,14 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from companion.safety.reasons import EndReason
 from companion.viewer.past import Past
 from companion.viewer.wire import Place, tile_message, tiles_in
 
 BACK_S = 1.0
 """A clock that goes back by more than this is another run's."""
 TILES_AT_ONCE = 200
+TAKE_OVER = "take the rover over if it still moves; why may be in the program's terminal or journal"
 RUN_KEYS = ("run", "map_epoch", "began_unix_s", "map")
 """Where one of these differs in a scene, a page forgets the map, and mostly everything that it has heard before."""
 
@@ -140,6 +142,12 @@ class LiveBoard:
             for spectator in self._spectators:
                 spectator.stale.add(place)
         self._wake()
+
+    def end(self) -> None:
+        """Nothing more comes of the run: where it has not said that it ended, its program is gone."""
+        if self.frame is not None and self.frame["state"] != "ended":
+            line = f"ended, {EndReason.GONE.value}"
+            self.take({**self.frame, "news": [], "state": "ended", "line": line, "why": TAKE_OVER, "drives": "nobody"})
 
     def _take_frame(self, frame: Json) -> None:
         if frame["t"] < self.past.newest_s - BACK_S:  # a page forgets what was before, too

@@ -12,6 +12,7 @@ from typing import Any
 from companion.app import Companion, Status
 from companion.core.clock import unix_time_us
 from companion.mavlink.local_station import LocalStation
+from companion.safety.reasons import EndReason
 from companion.settings import Settings
 from companion.settings.versions import versions
 from companion.viewer import wire
@@ -19,6 +20,9 @@ from companion.viewer.feed import ViewerFeed
 from companion.viewer.map_tiles import warm_up
 from companion.viewer.page_requests import PageRequests
 from companion.viewer.web_process import WebPlace, WebProcess
+
+MOST_ERROR = 300
+"""So many letters of an error are told."""
 
 
 class LiveViewer:
@@ -56,11 +60,6 @@ class LiveViewer:
         """Something bad that the companion does not know of."""
         if self._feed is not None:
             self._feed.warn(text)
-
-    def note_end(self, why: str) -> None:
-        """The companion is told to stop next, not by a person: why, for the large line."""
-        if self._feed is not None:
-            self._feed.ended_by = why
 
     def show(self, status: Status, touched: Sequence[Sequence[float]] | None = None) -> None:
         """To be called after each tick. ``touched``: where a simulated rover touched something, north and east.
@@ -100,15 +99,21 @@ class LiveViewer:
         for answer in self._requests.answered(self._companion):
             self.web.put(wire.JSON, json.dumps(answer).encode())
 
-    def end(self, line: str) -> None:
+    def end(self, reason: EndReason) -> None:
         """Tell how a run ended that did not end by itself."""
         if self._feed is None:
             return
         try:
-            self._feed.end(line)
+            self._feed.end(reason)
         except Exception as error:  # record and report have still to be closed
             self._feed = None
             self._say(f"the page is not told how the run ended: {type(error).__name__}: {error}")
+
+    def fail(self, error: BaseException) -> None:
+        """Tell that an error has ended the program, and which. To be called once the rover has been stopped."""
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        self.warn(f"An error has ended the program: {what:.{MOST_ERROR}}")
+        self.end(EndReason.ERROR)
 
     def close(self) -> None:
         """Tell the last moment, and end."""

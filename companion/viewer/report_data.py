@@ -26,7 +26,7 @@ from companion.replay.explain import Candidate, DecisionExplainer, Explanation, 
 from companion.replay.replay import ReplayObserver, ReplayResult, replay
 from companion.safety.reasons import EndReason, Reason
 from companion.viewer.arrivals import Arrivals
-from companion.viewer.frame import doing_of, frame_of, news_of, scene_of
+from companion.viewer.frame import doing_of, ending_of, frame_of, news_of, scene_of
 from companion.viewer.headway import Headway
 from companion.viewer.last_place import LastPlace
 from companion.viewer.map_tiles import TileWatch
@@ -69,7 +69,7 @@ def named(runs: Sequence[Run]) -> list[Run]:
 def joined(record: Record, watched: ReportWatch, run: Run, others: list[Run]) -> Json:
     """The parts of a report, put together."""
     if run.result.companion is not None:
-        watched.end(run.result.companion, run.result.seconds, stopped_by_user=record.meta.stopped_by_user)
+        watched.end(run.result.companion, run.result.seconds, record.meta.end_reason)
     contacts = [
         {
             "t": round(one["time_s"] - watched.began_s, 2),
@@ -162,13 +162,14 @@ class ReportWatch(ReplayObserver):
         elif self._headway.begins or doing_of(companion, status)["state"] != self._before["state"]:
             self._keep(companion, status, time_s)  # however short it is, what the tables count is to be seen
 
-    def end(self, companion: Companion, time_s: float, *, stopped_by_user: bool) -> None:
+    def end(self, companion: Companion, time_s: float, reason: EndReason | None) -> None:
         """The record ends here, perhaps between two frames, and perhaps in the middle of the drive."""
         if not self.frames or round(time_s, 2) > self.frames[-1]["t"]:
             self._keep(companion, companion.status(), time_s)
             self._take_map(companion, time_s)
-        if stopped_by_user and self._before["state"] != "ended":
-            self.frames[-1].update(state="ended", line=str(Reason(EndReason.STOPPED_BY_USER)), why="")
+        if reason is not None and self._before["state"] != "ended":
+            line, why = ending_of(companion, Reason(reason))
+            self.frames[-1].update(state="ended", line=line, why=why)
 
     def _keep(self, companion: Companion, status: Status, time_s: float) -> None:
         """A frame of this moment, without what has not changed since the last one."""

@@ -347,6 +347,8 @@ def _listen(app: WebApp, server: uvicorn.Server, loop: asyncio.AbstractEventLoop
         while (message := wire.read_message(sys.stdin.buffer)) is not None:
             room.acquire()  # a server that hangs takes nothing any more: that is noticed at the other end
             loop.call_soon_threadsafe(take, *message)
+    with contextlib.suppress(RuntimeError):
+        loop.call_soon_threadsafe(app.board.end)
     with contextlib.suppress(RuntimeError):  # once everybody has been told the last moment
         loop.call_soon_threadsafe(loop.call_later, LAST_S, setattr, server, "should_exit", True)
 

@@ -15,6 +15,7 @@ from companion.mapping.map_files import MapError
 from companion.mission.mission import MissionError
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import Recorder
+from companion.safety.reasons import EndReason
 from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.drive_run import mission_of, prepared, settings_of
 from sitl.campaign.policies import ERROR
@@ -155,15 +156,18 @@ def _drive_again(file: Path, run_id: str | None, record: Path | None) -> None:
     writable(record / "meta.json")
     mission, settings = mission_of(spec, folder), settings_of(spec)
     recorder = Recorder(record, mission, settings, spec.seed, arm=True, start_us=0)
+    ended_by: EndReason | None = None
     try:
-        report = prepared(spec, folder, recorder).run()
+        drive = prepared(spec, folder, recorder)
+        report = drive.run()
+        ended_by = drive.ended_by(EndReason.TIME_LIMIT)
     except Exception as error:
         if is_interrupt(error):
             raise
         what = " ".join(f"{type(error).__name__}: {error}".split())
         raise CampaignError(f"{spec.world}, seed {spec.seed}: the run ended with an error: {what:.300}") from error
     finally:
-        recorder.close()
+        recorder.close(ended_by=ended_by)
     contacts = f", {report.collisions} contacts" if report.collisions else ""
     typer.echo(f"{spec.world}, seed {spec.seed}: {report.outcome} after {report.driving_time_s:.1f} s{contacts}")
     typer.echo(f"record: {record}; rover-companion report {record} shows it")

@@ -26,7 +26,7 @@ from companion.mission.mission import Mission, MissionError
 from companion.mission.outline_hint import outline_hint
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
-from companion.safety.reasons import EndReason, Reason
+from companion.safety.reasons import EndReason
 from companion.settings import Settings, SettingsError
 from companion.viewer.live_viewer import LiveViewer
 from companion.viewer.terminal.painter import Painter, ViewError, terminal
@@ -130,17 +130,20 @@ def drive(
             report = run_with_progress(run, console, pace, also)
         else:
             report = run_with_view(run, painter, _paced(run, pace, also), also)
-        _end(page, f"ended: {report.outcome}")
+        _end(page, run.ended_by(EndReason.TIME_LIMIT))
     except BAD_INPUT as error:
         raise _refused(error) from error
     except KeyboardInterrupt:
         _print_last(painter, rows_below=1)
-        _end(page, str(Reason(EndReason.STOPPED_BY_USER)))
+        _end(page, EndReason.STOPPED_BY_USER)
         _keep(run, recorder)
         raise StoppedError(_stopped(run, recorder if record else NullRecorder())) from None
+    except Exception as error:
+        _fail(page, error)
+        raise
     finally:
         _closed(page)
-    recorder.close()
+    recorder.close(ended_by=run.ended_by(EndReason.TIME_LIMIT))
     _print_results(report, console, mission, settings)
     _print_last(painter, wanted.lines + isinstance(recorder, Recorder))
     unwritten = _written(wanted, run, recorder, console)
@@ -186,7 +189,7 @@ def _file(sensors: str | None) -> Path | None:
 
 def _keep(run: Drive | None, recorder: Recorder | NullRecorder) -> None:
     """What was recorded of a drive that was interrupted."""
-    recorder.close(stopped_by_user=True)
+    recorder.close(ended_by=None if run is None else run.ended_by(EndReason.STOPPED_BY_USER))
     if run is not None and isinstance(recorder, Recorder) and not recorder.problem:
         with contextlib.suppress(OutputError, MapError):  # the program ends with what it can say
             complete_record(run, recorder)
@@ -233,10 +236,15 @@ def _say_if_compiling(settings: Settings, mission: Mission) -> None:
         typer.echo(COMPILING, err=True)
 
 
-def _end(page: LiveViewer | None, line: str) -> None:
+def _end(page: LiveViewer | None, reason: EndReason) -> None:
     """How it ended, for the page, where the companion did not end it."""
     if page is not None:
-        page.end(line)
+        page.end(reason)
+
+
+def _fail(page: LiveViewer | None, error: Exception) -> None:
+    if page is not None:
+        page.fail(error)
 
 
 def _closed(page: LiveViewer | None) -> None:
@@ -255,11 +263,11 @@ def _shown(run: Drive, page: LiveViewer, settings: Settings) -> Also:
         log.look(collisions, start)
         page.show(status, [touched.from_start(start) for touched in collisions])
 
-    return Also(show, WEB_EVERY_S, page.note_end)
+    return Also(show, WEB_EVERY_S)
 
 
 def _paced(run: Drive, pace: Pace, also: Also) -> Callable[[float], None]:
-    unattended = Unattended(run, lambda _: None, also.ended)  # the view shows what the companion waits for
+    unattended = Unattended(run, lambda _: None)  # the view shows what the companion waits for
 
     def wait(time_s: float) -> None:
         unattended.look(run.companion.status())

@@ -10,6 +10,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.app import Status
 from companion.core.clock import Clock
+from companion.safety.reasons import EndReason, Reason
 from sitl.lockstep import TRACK_PERIOD_S, Drive, Report
 
 LINE_EVERY_S = 60.0
@@ -41,8 +42,6 @@ class Also:
 
     show: Callable[[Status], None] = lambda status: None
     every_s: float = TRACK_PERIOD_S
-    ended: Callable[[str], None] = lambda why: None
-    """Told why a run is stopped that nobody stops."""
 
 
 class Unattended:
@@ -51,31 +50,28 @@ class Unattended:
     Also one that does not begin, because data that it needs never comes.
     """
 
-    def __init__(self, run: Drive, say: Callable[[str], None], ended: Callable[[str], None]) -> None:
-        """``ended``: told the reason alone."""
+    def __init__(self, run: Drive, say: Callable[[str], None]) -> None:
         self._run = run
         self._say = say
-        self._tell_why = ended
         self._since_s: float | None = None
         self._ended = False
 
     def look(self, status: Status) -> None:
         """To be called often."""
         if self._run.companion.executor is None and status.time_s >= BEGINS_S and self._run.station is None:
-            self._end(status, f"{status.doing} since the start; it cannot be expected any more")
+            self._end(status, Reason(EndReason.NEVER_BEGINS, (status.doing,)))
         if not status.activity.needs_person or self._run.station is not None:
             self._since_s = None
             return
         self._since_s = status.time_s if self._since_s is None else self._since_s
         if status.time_s - self._since_s >= NOBODY_S:
-            self._end(status, "nobody is here to do what the companion waits for")
+            self._end(status, Reason(EndReason.NOBODY_HERE))
 
-    def _end(self, status: Status, why: str) -> None:
+    def _end(self, status: Status, why: Reason[EndReason]) -> None:
         if not self._ended:
             self._ended = True
             self._say(f"{status.time_s:6.1f} s  ended: {why}")
-            self._tell_why(why)
-            self._run.companion.stop()
+            self._run.companion.stop(why.kind)
 
 
 class Telling:
@@ -111,7 +107,7 @@ def run_with_progress(run: Drive, console: Console, pace: Pace, also: Also = Als
     with Progress(*columns, console=console) as progress:
         task = progress.add_task(run.mission.name, total=None, state="")
         telling = Telling(run, progress.console)
-        unattended = Unattended(run, telling.line, also.ended)
+        unattended = Unattended(run, telling.line)
 
         def observe(status: Status) -> None:
             telling.tell(status)
@@ -130,7 +126,7 @@ def run_with_progress(run: Drive, console: Console, pace: Pace, also: Also = Als
 
 def _run_with_lines(run: Drive, console: Console, pace: Pace, also: Also) -> Report:
     telling, next_s = Telling(run, console), 0.0
-    unattended = Unattended(run, telling.line, also.ended)
+    unattended = Unattended(run, telling.line)
 
     def observe(status: Status) -> None:
         nonlocal next_s

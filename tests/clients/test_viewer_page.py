@@ -75,10 +75,10 @@ for (let i = 0; i < w * Math.floor(0.9 * h); i++) {  // below is the scale of co
 return [n, x / n, y / n]
 """
 """How many pixels of the map have this colour, and where the middle of them is."""
-LIGHT = {"unknown": "#9fa9b3", "free": "#ffffff", "obstacle": "#12181e", "rover": "#e04a00"}
+LIGHT = {"unknown": "#9fa9b3", "free": "#ffffff", "obstacle": "#12181e", "rover": "#cc4200"}
 DARK = {"unknown": "#101418", "free": "#4b5864", "obstacle": "#f3f6f8", "rover": "#ff7a33"}
 """Of the map, as the legend shows them."""
-FAST = "#5cb531"
+FAST = "#4a9a20"
 """The track where the rover drove at its cruise speed."""
 SEEK = (
     "const s = document.querySelector('input[type=range]'); s.value = +s.max * arguments[0];"
@@ -202,7 +202,7 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             assert [fault for fault in desktop.faults if "WebSocket" not in fault and "ERR_" not in fault] == []
             desktop.press("Pause")
             desktop.shows("HOLD", "Paused on request")
-            assert "Companion silent" not in desktop.text, "it is told once"
+            assert "no longer steers" not in desktop.text, "it is told once"
             desktop.press("Go on")
             desktop.shows("GUIDED", "Going on as requested", "Go on: done")
             for _ in range(4):

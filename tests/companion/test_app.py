@@ -25,7 +25,7 @@ def test_from_the_first_heartbeat_to_the_first_setpoint(whole: Whole) -> None:
     assert Arm() in whole.ticks(3.2) and whole.awaited() is WaitReason.ARMING
     whole.autopilot.ack = AckSeen(whole.clock.time_s, 400, 4)
     whole.tick()
-    assert whole.companion.outcome.said[-1] == "The autopilot refuses to arm (result 4)"
+    assert whole.companion.outcome.said[-1] == "The autopilot refuses to arm (failed): its own texts say why"
     whole.autopilot.ack = None
     sent = whole.drive()
     assert whole.companion.executor is not None and whole.companion.status().activity.phase is RunPhase.DRIVING

@@ -99,7 +99,7 @@ def test_the_bench_step_happens_as_it_says(tmp_path: Path) -> None:
                 said += run.stderr.readline()
             wait_until(lambda: rover.simulator.driven_m > 0.1)
             rover.pilot(SET_MODE, float(ARMED & 1 | 1), float(HOLD))
-            while "Companion silent: mode is not GUIDED" not in said:
+            while "Companion no longer steers: mode is not GUIDED; it waits for a person to set GUIDED" not in said:
                 said += run.stderr.readline()
             assert rover.mode() == HOLD
     finally:

@@ -106,7 +106,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
         patch.setattr(feed, "SCENE_S", -1.0)
         shown.finish(run.run(observe))
     recorder.close()
-    assert any("EKF origin moved" in text for text in run.companion.outcome.said)
+    assert any("moved its origin" in text for text in run.companion.outcome.said)
     yield Driven(run, viewer.views, statuses, page.told, record, rovers)
 
 

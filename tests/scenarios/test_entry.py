@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from companion.cli.commands import app as companion_commands
 from companion.cli.entry import StoppedError, start
 from companion.recording.reader import load_record
+from companion.safety.reasons import EndReason
 from sitl.cli.commands import app as sitl_commands
 from tests.support.forked import run
 from tests.support.quick import first_of
@@ -138,7 +139,7 @@ def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
     assert code == 130 and errors.count("\n") == 1
     assert errors.startswith(f"stopped by {word}: Rooms after ") and "0 of 1 targets reached" in errors
     assert errors.endswith(f"record so far: {record}; rover-companion report {record} shows it\n")
-    assert load_record(record).meta.stopped_by_user
+    assert load_record(record).meta.end_reason is EndReason.STOPPED_BY_USER
     assert all((record / name).stat().st_size > 0 for name in ("link.tlog", "map.yaml", "map.pgm"))
 
 

@@ -10,7 +10,7 @@ import pytest
 from companion.operator.notifications import NOT_FOLLOWED_S
 from tests.support.rig import GATE, GUIDED, HOLD, Rig, yard
 
-ANOTHER = "The autopilot follows another target than the one sent"
+ANOTHER = "The autopilot follows another target than the one sent: does another program steer it?"
 
 
 @pytest.mark.thorough

@@ -14,6 +14,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from companion.app import Companion
+from companion.cli import replay as replay_command
 from companion.cli.commands import app
 from companion.cli.images import CHEAP_COLOUR, FREE_COLOUR, START_COLOUR, TAKEN_COLOUR, UNSEEN_COLOUR
 from companion.core.tick_marks import Mark
@@ -237,6 +238,7 @@ def test_a_record_that_is_cut_anywhere_is_replayed_as_far_as_it_goes(
     assert result.ticks <= lengths["rounds.bin"] // CHECKED_TICK.size
 
 
+@pytest.mark.thorough
 def test_a_decision_that_a_cut_record_does_not_reach_is_not_explained(record: Path, tmp_path: Path) -> None:
     copy = tmp_path / "cut"
     shutil.copytree(record, copy)
@@ -292,14 +294,18 @@ def test_decisions_are_listed_so_that_one_can_be_chosen(copy: Path) -> None:
     assert any(line.endswith("- Reached gate") for line in lines) and lines[-2] == "differences: none"
 
 
-@pytest.mark.thorough
-def test_why_takes_a_moment_and_shows_the_decision_in_force(record: Path, tmp_path: Path) -> None:
+@first_of(1, "which", ["time of day", "seconds"])
+def test_why_takes_a_moment_of_the_list_and_shows_the_decision_in_force(
+    record: Path, tmp_path: Path, which: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without its picture, which takes seconds."""
+    monkeypatch.setattr(replay_command, "save_decision", lambda image, _: image.touch())
     listed = CliRunner().invoke(app, ["replay", str(record), "--list"]).output.splitlines()
     number, of_day, after_s = next(line.split()[:3] for line in listed if line.split()[:1] == ["7"])
-    for moment in (f"{after_s}s", of_day):
-        asked = ["replay", str(record), "--why", moment, "--image", str(tmp_path / "why.png")]
-        result = CliRunner().invoke(app, asked)
-        assert result.exit_code == 0 and result.output.startswith(f"decision {number} at {after_s} s")
+    moment, image = of_day if which == "time of day" else f"{after_s}s", tmp_path / "why.png"
+    result = CliRunner().invoke(app, ["replay", str(record), "--why", moment, "--image", str(image)])
+    assert result.exit_code == 0 and result.output.startswith(f"decision {number} at {after_s} s")
+    assert "taken: " in result.output and image.exists()
 
 
 @first_of(

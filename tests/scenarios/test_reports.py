@@ -25,6 +25,7 @@ from companion.cli.commands import app
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
 from companion.replay.replay import Observers, replay
+from companion.safety.reasons import EndReason
 from companion.viewer import frame, map_tiles, report_data, report_mcap
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
 from companion.viewer.frame import doing_of
@@ -39,6 +40,8 @@ from tests.support.quick import first_of
 from tests.support.records import START_US, recorded, write_record
 from tests.support.reports import report_data_in
 from tests.support.rig import yard
+
+FFMPEG = shutil.which("ffmpeg")
 
 
 @pytest.fixture(scope="module")
@@ -63,9 +66,10 @@ def made_of(record: Path, folder: Path) -> Path:
         folder / "r.html",
         "--gif",
         folder / "r.gif",
+        *(["--mp4", folder / "r.mp4"] if FFMPEG else []),
     ]
     result = CliRunner().invoke(app, ["report", str(record), *map(str, forms)])
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == 0 and f"film: {folder / 'r.gif'} (" in result.output, result.output
     return folder
 
 
@@ -286,12 +290,9 @@ def test_a_map_that_is_large_is_written_for_other_programs_less_often(
     assert 1 <= maps(tmp_path / "large.mcap") <= 2 < usual
 
 
-@pytest.mark.thorough
-@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
-def test_the_film_is_made_by_ffmpeg_too(record: Path, tmp_path: Path) -> None:
-    result = CliRunner().invoke(app, ["report", str(record), "--mp4", str(tmp_path / "r.mp4")])
-    assert result.exit_code == 0 and result.output.startswith(f"film: {tmp_path / 'r.mp4'} (")
-    data = (tmp_path / "r.mp4").read_bytes()
+@pytest.mark.skipif(FFMPEG is None, reason="no ffmpeg")
+def test_the_film_is_made_by_ffmpeg_too(record: Path, made: Path) -> None:
+    data = (made / "r.mp4").read_bytes()
     assert data[4:8] == b"ftyp" and b"avc1" in data and 10_000 < len(data) < 1_000_000
     assert not (record / "report.html").exists()
 
@@ -342,6 +343,21 @@ since = "driving"
 start_s = 3.0
 duration_s = 1.6
 """
+
+
+def test_several_records_are_compared_on_the_terminal_and_on_the_page(tmp_path: Path) -> None:
+    """Broken off before the rover could drive: that takes hardly any time."""
+    records = [recorded(tmp_path / f"record-{limit_s}", yard(tmp_path), limit_s=limit_s) for limit_s in (1, 2, 3)]
+    result = CliRunner().invoke(app, ["report", *map(str, records), "--out", str(tmp_path / "r.html")])
+    assert result.exit_code == 0, result.output
+    lines = result.output.replace("\xa0", " ").splitlines()[1:]
+    assert lines[0].split() == ["record-1", "record-2", "record-3"]
+    time_s, second_s, more, third_s, much_more = next(line for line in lines if "time, s" in line).split()[-5:]
+    assert float(second_s) - float(time_s) == pytest.approx(float(more[1:-1]), abs=0.11) == pytest.approx(1.0, abs=0.2)
+    assert float(third_s) - float(time_s) == pytest.approx(float(much_more[1:-1]), abs=0.11)
+    data = report_data_in(tmp_path / "r.html")
+    assert [one["name"] for one in data["others"]] == ["record-2", "record-3"]
+    assert data["tables"][0]["title"] == "Differences"
 
 
 @pytest.mark.thorough
@@ -454,6 +470,6 @@ def test_a_report_reaches_the_last_moment_of_a_drive_that_was_broken_off_and_say
     assert [state for _, state in states][-3:] == ["driving", "stopped", "driving"]
     assert states[-1][0] - states[-2][0] == pytest.approx(0.05)
     assert len(times) < run.result.seconds / 0.4 + 5
-    record.meta.stopped_by_user = True
+    record.meta.ended_by = EndReason.STOPPED_BY_USER.name
     last = joined(record, watched, run, [])["frames"][-1]
-    assert (last["state"], last["line"], last["t"]) == ("ended", "stopped by the user", times[-1])
+    assert (last["state"], last["t"]) == ("ended", times[-1]) and last["line"].startswith("stopped by the user: ")

@@ -1,7 +1,9 @@
 // All colours of the page, for light and dark, and the switch between them.
 //
 // Warm colours are the rover and what lies ahead of it, cool colours are the past. State and level never depend on a
-// colour alone: each has a sign, too. The CSS takes its colours from here, so canvas and page cannot differ.
+// colour alone: each has a sign, too. Readable in the sun: texts have a contrast of 4.5 or more with their ground, the
+// large line 7, lines on the map 3 with the ground or with their casing (test_page_contrast.py). The CSS takes its
+// colours from here, so canvas and page cannot differ.
 
 const LIGHT = {
   page: "#eef1f4",
@@ -15,18 +17,18 @@ const LIGHT = {
   free: "#ffffff",
   obstacle: "#12181e",
   closed: "#e9c9dc",
-  closedLine: "#c58bb0",
+  closedLine: "#b97ba3",
   costly: "#f2e3b3",
   grid: "rgba(20, 40, 60, 0.13)",
   fence: "#8e2a6b",
   halo: "#ffffff",
   ink: "#0d1319",
-  rover: "#e04a00",
+  rover: "#cc4200",
   roverEdge: "#1a0a00",
-  path: "#e04a00",
+  path: "#cc4200",
   motion: "#a3005c",
   setpoint: "#a3005c",
-  goal: "#e04a00",
+  goal: "#cc4200",
   goalText: "#ffffff",
   ray: "rgba(0, 90, 170, 0.13)",
   rayEnd: "rgba(0, 80, 160, 0.65)",
@@ -34,10 +36,11 @@ const LIGHT = {
   home: "#0d1319",
   done: "#00665a",
   failed: "#a8200d",
+  doubt: "#b87500",
   pending: "#ffffff",
   future: "rgba(20, 40, 60, 0.4)",
   casing: "rgba(255, 255, 255, 0.9)",
-  speeds: ["#5a1e8c", "#3b4fa3", "#1f7a94", "#149a76", "#5cb531"],
+  speeds: ["#5a1e8c", "#3b4fa3", "#1f7a94", "#149a76", "#4a9a20"],
   others: ["#8a5a00", "#0072b2", "#b0407f", "#00806a", "#5f6b00"],
 };
 
@@ -53,7 +56,7 @@ const DARK = {
   free: "#4b5864",
   obstacle: "#f3f6f8",
   closed: "#4f2b45",
-  closedLine: "#8a4f79",
+  closedLine: "#d896c2",
   costly: "#4a4329",
   grid: "rgba(210, 230, 250, 0.10)",
   fence: "#f08cc8",
@@ -72,6 +75,7 @@ const DARK = {
   home: "#f4f7f9",
   done: "#39d0b4",
   failed: "#ff7b66",
+  doubt: "#ffc531",
   pending: "#13181d",
   future: "rgba(210, 230, 250, 0.4)",
   casing: "rgba(10, 13, 16, 0.9)",
@@ -81,9 +85,9 @@ const DARK = {
 
 /** What the page calls them; the same in light and dark, because they are large areas with their own text colour. */
 const STATES = {
-  driving: ["#0b5cad", "#ffffff"],
+  driving: ["#0a56a3", "#ffffff"],
   waiting: ["#ffc531", "#161000"],
-  stopped: ["#b3220c", "#ffffff"],
+  stopped: ["#a81f0b", "#ffffff"],
   ended: ["#33414e", "#ffffff"],
   connecting: ["#33414e", "#ffffff"],
   offline: ["#000000", "#ffffff"],

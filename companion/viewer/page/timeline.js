@@ -140,7 +140,7 @@ export class Timeline {
 function drawMark(context, kind, x) {
   const colours = theme.colours;
   const y = 12;
-  context.fillStyle = { good: colours.done, stop: colours.text, warning: "#d98e00" }[kind] ?? colours.failed;
+  context.fillStyle = { good: colours.done, stop: colours.text, warning: colours.doubt }[kind] ?? colours.failed;
   context.strokeStyle = context.fillStyle;
   context.lineWidth = 3;
   context.beginPath();

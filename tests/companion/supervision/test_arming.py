@@ -189,7 +189,7 @@ def test_an_autopilot_that_refuses_to_arm_is_told_once(tmp_path: Path) -> None:
     assert start.step(HOLD, armed=False) is WaitReason.GUIDED and start.notices.told == []
     for _ in range(2):
         assert start.step(armed=False) is WaitReason.ARMING
-    assert start.notices.told == [("The autopilot refuses to arm (result 4)", Severity.WARNING)]
+    assert start.notices.told == [("The autopilot refuses to arm (failed): its own texts say why", Severity.WARNING)]
 
 
 @pytest.mark.parametrize(("mode", "armed"), [(HOLD, False), (HOLD, True), (MANUAL, False)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from companion.safety.mode_latch import Control, Reaction
@@ -70,7 +71,9 @@ def test_a_companion_that_falls_silent_says_what_it_waits_for(tmp_path: Path) ->
     permitted.verdict()
     permitted.stand(0.0, 0.0, mode=HOLD)
     assert permitted.verdict() is Reaction.SILENT
-    assert permitted.notices.texts == ["Companion silent: mode is not GUIDED"]
+    assert permitted.notices.texts == [
+        "Companion no longer steers: mode is not GUIDED; it waits for a person to set GUIDED"
+    ]
     activity = permitted.run.activity
     assert activity.phase is RunPhase.STOPPED_AND_WAITING and activity.needs_person
     assert activity.awaited is not None and activity.awaited.kind is WaitReason.PERSON_SETS_MODE
@@ -102,3 +105,15 @@ def test_who_drives_is_followed_from_heartbeat_to_heartbeat_before_the_mission(t
         desk.run.vehicle = fold(desk.run.vehicle, heartbeat)
         permission.take(heartbeat, desk.run.vehicle)
     assert desk.run.latch.control is Control.PERSON
+
+
+def test_what_a_person_is_to_do_is_told_without_the_data_that_comes_and_goes(tmp_path: Path) -> None:
+    """Else the same text would be told anew with each other age of a message."""
+    permitted = Permitted(tmp_path)
+    permitted.verdict()
+    permitted.stand(0.0, 0.0, mode=HOLD)
+    permitted.run.vehicle = replace(permitted.run.vehicle, position=None)
+    permitted.verdict()
+    assert permitted.run.activity.awaited is not None
+    assert permitted.run.activity.awaited.kind is WaitReason.GOOD_DATA_AND
+    assert permitted.notices.texts[-1].endswith("; it waits for a person to set GUIDED")

@@ -34,7 +34,9 @@ def ending(desk: Desk) -> Shutdown:
     return Shutdown(desk.run, link, desk.settings, desk.notices)
 
 
-@pytest.mark.parametrize(("why", "told"), [(DONE, []), (ERROR, [("Companion: error, HOLD", Severity.WARNING)])])
+@pytest.mark.parametrize(
+    ("why", "told"), [(DONE, []), (ERROR, [("Companion: an error in the program, HOLD", Severity.WARNING)])]
+)
 def test_a_rover_of_ours_is_stopped_and_put_into_hold(desk: Desk, why: Reason[EndReason], told: list[Any]) -> None:
     shutdown = ending(desk)
     shutdown.begin(why, 10.0)

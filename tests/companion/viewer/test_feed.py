@@ -14,6 +14,7 @@ import pytest
 from companion.mission.load import load_mission
 from companion.mission.mission import HomePoint
 from companion.recording.recorder import NullRecorder
+from companion.safety.reasons import EndReason
 from companion.settings.settings_file import parse_settings
 from companion.viewer import feed, wire
 from companion.viewer.feed import ViewerFeed
@@ -104,17 +105,29 @@ def test_a_whole_drive_is_told_and_is_no_other_for_it() -> None:
     assert heard.scenes[-1]["map"]["columns"] == columns and heard.scenes[-1]["targets"]
 
 
-@pytest.mark.parametrize("why", ["", "nobody is here"])
 @pytest.mark.usefixtures("every_tick")
-def test_a_run_that_no_person_stopped_does_not_say_so(why: str) -> None:
+def test_a_run_that_is_broken_off_says_by_what() -> None:
     run, heard = new_drive("points"), Heard()
     watched = ViewerFeed(run.companion, heard, {})
-    watched.ended_by = why
-    run.companion.stop()
-    run.run(watched.show, 0.05)
+    run.companion.tick()
+    watched.end(run.ended_by(EndReason.TIME_LIMIT))
+    last = heard.frames[-1]
+    assert (last["state"], last["line"]) == ("ended", "ended, time limit reached: 0 of 1 targets reached")
+    assert last["why"].endswith(": not reached")
+
+
+@pytest.mark.usefixtures("every_tick")
+def test_a_run_that_an_error_has_ended_says_so_after_the_rover_was_stopped() -> None:
+    run, heard = new_drive("points"), Heard()
+    watched = ViewerFeed(run.companion, heard, {})
+    run.companion.tick()
     watched.show(run.take_status())
-    last, how = heard.frames[-1], f"ended, {why}" if why else "stopped by the user"
-    assert (last["state"], last["line"]) == ("ended", f"{how}: 0 of 1 targets reached")
+    run.companion.close()
+    watched.warn("what it was")
+    watched.end(EndReason.ERROR)
+    last = heard.frames[-1]
+    assert (last["state"], last["line"]) == ("ended", "ended, an error in the program: 0 of 1 targets reached")
+    assert last["news"][-1]["text"] == "what it was"
 
 
 @pytest.mark.thorough

@@ -87,7 +87,10 @@ BLIND = Reason(WaitReason.GOOD_DATA_AND, (Reason(Doubt.DATA_OLD, ("range data", 
 BLINDED = Activity(RunPhase.STOPPED_AND_WAITING, NOT_OURS, BLIND)
 WAITING = Activity(RunPhase.WAITING, awaited=Reason(WaitReason.ARMING))
 DOUBTED = Activity(RunPhase.STOPPED, Reason(Doubt.POSITION_WANDERS))
-DONE, BY_USER = (Activity(RunPhase.ENDED, Reason(kind)) for kind in (EndReason.DONE, EndReason.STOPPED_BY_USER))
+DONE, BY_USER, NOBODY = (
+    Activity(RunPhase.ENDED, Reason(kind))
+    for kind in (EndReason.DONE, EndReason.STOPPED_BY_USER, EndReason.NOBODY_HERE)
+)
 LOW = Reason(PowerReason.LOW, ("battery",))
 ROLLS, PILOT = {"forward_m_s": 1.0}, {"mode": RoverMode.MANUAL}
 RESTARTED = {"restarted": True, "armed": False}
@@ -127,6 +130,7 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
             "ended early, battery low for the autopilot: 1 of 2 targets reached",
             "shed: unreachable",
         ),
+        (NOBODY, {}, "ended, nobody is here to do what the companion waits for", ""),
         (BY_USER, {"shed": TargetStatus.PENDING}, "stopped by the user: 1 of 2 targets reached", "shed: not reached"),
     ],
 )

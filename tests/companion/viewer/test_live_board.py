@@ -56,6 +56,18 @@ def test_who_comes_late_is_told_scene_past_map_and_the_newest_frame() -> None:
     assert sorted(places) == [(column, 0) for column in range(TILES_AT_ONCE + 50)]
 
 
+@pytest.mark.parametrize("state", ["driving", "ended"])
+def test_a_run_that_never_said_that_it_ended_is_told_as_gone(state: str) -> None:
+    live = board()
+    looks_on = live.join(False, lambda: None)
+    live.take({**frame(1.0, "news"), "state": state})
+    heard(looks_on)
+    live.end()
+    told, _ = heard(looks_on)
+    assert [(one["state"], one["drives"], one["news"]) for one in told] == [("ended", "nobody", [])][: state != "ended"]
+    board().end()  # nothing was told yet
+
+
 def test_a_slow_browser_misses_frames_but_no_news_and_no_tile() -> None:
     live = board()
     spectator = live.join(False, lambda: None)

@@ -8,12 +8,14 @@ from dataclasses import replace
 import pytest
 
 from companion.cli.web import served, web_viewer
+from companion.safety.reasons import EndReason
 from companion.viewer.live_viewer import LiveViewer
 from companion.viewer.web_process import WebError, WebPlace
 from tests.companion.viewer.test_feed import new_drive
+from tests.support.quick import first_of
 
 
-@pytest.mark.parametrize("time_s", [math.nan, math.inf])
+@first_of(1, "time_s", [math.nan, math.inf])
 def test_a_fault_of_the_picture_is_told_once_and_the_drive_goes_on(time_s: float) -> None:
     told: list[str] = []
     viewer, run = LiveViewer(WebPlace("127.0.0.1", 0), told.append), new_drive("points")
@@ -33,8 +35,8 @@ def test_a_fault_at_the_end_is_told_and_keeps_nothing_from_being_closed(monkeypa
     try:
         viewer.follow(run.companion, run.settings, simulated=True)
         monkeypatch.setattr(run.companion, "status", lambda: 1 / 0)
-        viewer.end("stopped by the user")
-        viewer.end("stopped by the user")
+        viewer.end(EndReason.STOPPED_BY_USER)
+        viewer.end(EndReason.STOPPED_BY_USER)
     finally:
         viewer.close()
     assert told == ["the page is not told how the run ended: ZeroDivisionError: division by zero"]

@@ -114,6 +114,16 @@ def test_a_browser_gets_the_page_and_what_the_run_tells(web: WebProcess) -> None
         assert wire.tile_message([((3, 4), runs)]) in kinds and "frame" in kinds
 
 
+def test_a_companion_that_is_gone_without_a_word_is_told(web: WebProcess) -> None:
+    """Its pipe ends, as when it is killed."""
+    with looking(web) as client:
+        web.put(wire.JSON, json.dumps(frame(1.0)).encode())
+        assert next_of(client, "frame")["state"] == "driving"
+        web.close()
+        last = next_of(client, "frame")
+    assert last["state"] == "ended" and last["line"].startswith("ended, the companion's program is gone")
+
+
 def test_no_other_page_and_no_other_name_gets_in(web: WebProcess) -> None:
     port = web.place.port
     for origin in ("http://evil.example", "http://127.0.0.1:1", "null"):

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from companion.operator.notifications import Status
-from companion.safety.reasons import Activity, Doubt, Reason, RunPhase, WaitReason
+from companion.safety.reasons import Activity, Doubt, EndReason, Reason, RunPhase, WaitReason
 from sitl.cli.drive_progress import BEGINS_S, Pace, Unattended
 from tests.support.notices import HandClock
 
@@ -34,31 +34,30 @@ class Run:
 
     executor: object | None = None
     station: None = None
-    stops: list[float] = field(default_factory=list)
+    stops: list[EndReason] = field(default_factory=list)
 
     @property
     def companion(self) -> Run:
         return self
 
-    def stop(self) -> None:
-        self.stops.append(1.0)
+    def stop(self, why: EndReason) -> None:
+        self.stops.append(why)
 
 
-def looked_at(executor: object | None) -> tuple[list[str], int]:
+def looked_at(executor: object | None) -> tuple[list[str], list[EndReason]]:
     run: Any = Run(executor)
     said: list[str] = []
-    why: list[str] = []
-    unattended = Unattended(run, said.append, why.append)
+    unattended = Unattended(run, said.append)
     for time_s in (1.0, BEGINS_S - 1.0, BEGINS_S, BEGINS_S + 1.0):
         unattended.look(Status(time_s, Activity(RunPhase.WAITING, None, AWAITED), None, None, "", 0, 1, 0))
-    assert [line.partition("ended: ")[2] for line in said] == why
-    return said, len(run.stops)
+    return said, run.stops
 
 
 def test_a_run_that_waits_for_data_that_never_comes_ends_with_its_reason() -> None:
     (line,), stops = looked_at(None)
-    assert "ended: waiting for good data (no range data ahead) since the start" in line and stops == 1
+    assert "ended: waiting for good data (no range data ahead) since the start" in line
+    assert stops == [EndReason.NEVER_BEGINS]
 
 
 def test_one_that_has_begun_may_wait_for_data() -> None:
-    assert looked_at(object()) == ([], 0)
+    assert looked_at(object()) == ([], [])
