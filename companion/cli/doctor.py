@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -27,14 +28,15 @@ from companion.diagnosis.payload import Command, parameters_of, payload
 from companion.executive.warm_up import kernels_warm
 from companion.lidar.examination import LidarHeard, lidar_findings
 from companion.lidar.reader import LidarReader, Lidars, lidars_on
-from companion.lidar.serial_port import open_ports
+from companion.lidar.serial_port import listened, open_ports
 from companion.lidar.spec import LidarError, LidarSpec
+from companion.lidar.swapped_port import INSTEAD_OF, findings_of_port
 from companion.lidar.trouble import LidarTrouble, trouble
 from companion.mapping.map_files import MapError
 from companion.mavlink import port_users
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
-from companion.mavlink.transport import ByteLink, LinkError, open_link
+from companion.mavlink.transport import ByteLink, LinkError, device_of, open_link
 from companion.mission.doubtful_places import doubtful_places
 from companion.mission.field_size import field_size, finer_evidence, sure_gap_m
 from companion.mission.load import load_mission
@@ -96,7 +98,7 @@ def doctor(
     heard = wired.heard(now_s - began_s)
     findings = [
         *lidar_findings(heard, others_look_ahead=seen.vehicle.scan_ahead is not None),
-        *diagnose(seen, settings.safety.gps_fix),
+        *_diagnosed(seen, settings, device_of(connect)),
         *payload(seen, commands),
         *([] if mission is None else of_mission(mission, seen, settings)),
         *kernels(cold=not kernels_warm(settings)),
@@ -114,6 +116,13 @@ def doctor(
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
+
+
+def _diagnosed(seen: Survey, settings: Settings, device: str | None) -> list[Finding]:
+    """What is found about the autopilot, or about what is on its port instead; call it when the link is closed."""
+    findings = diagnose(seen, settings.safety.gps_fix)
+    swapped = list(findings_of_port(seen.place, seen.strange, partial(listened, device) if device else None))
+    return [*swapped, *(one for one in findings if not (swapped and one.name in INSTEAD_OF))]
 
 
 def commands_of(mission: Mission | None) -> list[Command]:

@@ -23,6 +23,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place
 from companion.mission.outline_hint import outline_hint
 from companion.mission.resolve import ResolvedMission, resolve
+from companion.mission.world_shapes import touches_obstacle
 from companion.settings import MappingSettings
 from companion.storage.toml_file import read_toml
 
@@ -182,18 +183,33 @@ def _maps(mission: Mission) -> list[str]:
     if mission.prior_map is not None:
         lines.append(f"known map: {mission.prior_map}: {_map_text(load_map(mission.prior_map, resolution_m))}")
     if sitl is not None and sitl.world is not None and sitl.world.suffix.lower() == ".toml":
-        size_m = read_toml(sitl.world, MissionError).get("size_m")
-        if isinstance(size_m, list) and len(size_m) == len(("east", "north")):
-            _check_inside(mission, sitl.resolution_m or resolution_m, *map(float, size_m))
+        _check_world_file(mission, sitl.world, sitl.resolution_m or resolution_m)
         lines.append(f"simulator's world: {sitl.world}: a world file; what it describes only rover-sitl checks")
     elif sitl is not None and sitl.world is not None:
         world = load_map(sitl.world, sitl.resolution_m or resolution_m)
         _check_inside(mission, world.resolution_m, world.width * world.resolution_m, world.height * world.resolution_m)
         if sitl.start is not None and world.is_obstacle(sitl.start):
-            says = f"sitl.start: field {sitl.start.x}, {sitl.start.y} is an obstacle in {sitl.world}"
-            raise MissionError(f"{mission.source or mission.name}: {says}; choose a free field")
+            raise _on_wall(mission, sitl.start, f"is an obstacle in {sitl.world}")
         lines.append(f"simulator's world: {sitl.world}: {_map_text(world)}")
     return lines
+
+
+def _check_world_file(mission: Mission, world: Path, field_m: float) -> None:
+    """Raises MissionError where ``sitl.start``, in fields of ``field_m``, lies outside this world or on a wall."""
+    content = read_toml(world, MissionError)
+    size_m, cell = content.get("size_m"), mission.sitl.start if mission.sitl is not None else None
+    if isinstance(size_m, list) and len(size_m) == len(("east", "north")):
+        _check_inside(mission, field_m, *map(float, size_m))
+    if cell is None:
+        return
+    place_m = ((cell.y + 0.5) * field_m, (cell.x + 0.5) * field_m)
+    if touches_obstacle(world, content, mission.rover.footprint, place_m):
+        raise _on_wall(mission, cell, f"touches an obstacle of {world}")
+
+
+def _on_wall(mission: Mission, cell: Cell, says: str) -> MissionError:
+    where = f"{mission.source or mission.name}: sitl.start: field {cell.x}, {cell.y}"
+    return MissionError(f"{where} {says}; choose a free field")
 
 
 def _check_inside(mission: Mission, field_m: float, east_m: float, north_m: float) -> None:

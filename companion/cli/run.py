@@ -35,6 +35,7 @@ from companion.executive.warm_up import COMPILING, kernels_warm, settle, warm_up
 from companion.lidar.reader import Lidars, lidars_on
 from companion.lidar.serial_port import open_ports
 from companion.lidar.spec import LidarError, LidarSpec
+from companion.lidar.swapped_port import StrangePort
 from companion.mapping.map_files import MapError
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -276,7 +277,10 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
     if isinstance(rig.live, LiveView):
         rig.live.follow(companion)
 
+    strange = StrangePort(rig.link.description, lambda text: rig.live.tell(text, Severity.WARNING))
+
     def show(status: Status) -> None:
+        strange.look(status.time_s, rig.autopilot.codec.strange)
         rig.live.show(status)
         service.show(status)
         if rig.page is not None:

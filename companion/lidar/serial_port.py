@@ -32,6 +32,18 @@ PAUSE_S = 0.005
 RETRY_S = 0.5
 CUT = b""
 
+LISTEN_S = 0.4
+LISTEN_BYTES = 2048
+
+
+def listened(device: str, baud: int) -> bytes:
+    """What comes on a port that nobody is told to begin on; empty if it cannot be opened."""
+    try:
+        with serial.Serial(device, baud, timeout=LISTEN_S, exclusive=True) as port:
+            return bytes(port.read(LISTEN_BYTES))
+    except (OSError, ValueError):
+        return b""
+
 
 class SerialLidarPort:
     """Opens the port at once; raises LidarError if that fails. Later it opens it again by itself."""

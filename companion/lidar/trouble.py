@@ -58,12 +58,18 @@ def _instead(sample: bytes, model: LidarModel) -> str:
     """What these bytes are, as far as that can be told. At a wrong speed of the line they are only noise."""
     if _is_mavlink(sample):
         return "they are MAVLink: is this the autopilot's port? Give the lidar's own"
+    if found := senders_of(sample, model):
+        return f"they are those of {found}: give --lidar that model"
     others = [one for one in MODELS if one.decoder is not model.decoder]
-    found = [one.name for one in others if len(one.decoder().feed(sample)) >= SOME_POINTS]
-    if found:
-        return f"they are those of {' or '.join(map(_an, found))}: give --lidar that model"
     names = ", ".join(one.name for one in others)
     return f"is it another model ({names}), or is something else on this port?"
+
+
+def senders_of(sample: bytes, besides: LidarModel | None = None) -> str:
+    """Which lidars send such bytes, in words; empty for none. ``besides``: of one that speaks otherwise than this."""
+    others = [one for one in MODELS if besides is None or one.decoder is not besides.decoder]
+    found = [one.name for one in others if len(one.decoder().feed(sample)) >= SOME_POINTS]
+    return " or ".join(map(_an, found))
 
 
 def _is_mavlink(sample: bytes) -> bool:

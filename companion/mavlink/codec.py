@@ -38,6 +38,10 @@ class LinkCounters:
     """Packets refused because of a wrong or missing signature."""
 
 
+STRANGE_BYTES = 2048
+"""Kept of what comes before the first packet: to tell what else is on the line."""
+
+
 class Codec:
     """Decodes packets of the vehicle and encodes commands to it.
 
@@ -61,6 +65,13 @@ class Codec:
         self._signer = signer
         self._recorded = recorded
         self._signed_heard = False
+        self._packet_heard = False
+        self._strange = b""
+
+    @property
+    def strange(self) -> bytes:
+        """The newest bytes of a link on which no packet has come yet; empty once one has."""
+        return self._strange
 
     @property
     def system_id(self) -> int:
@@ -147,7 +158,10 @@ class Codec:
 
     def packets(self, data: bytes) -> list[Packet]:
         """The complete packets in these bytes, of all senders."""
-        return self._framer.feed(data)
+        found = self._framer.feed(data)
+        self._packet_heard |= bool(found)
+        self._strange = b"" if self._packet_heard else (self._strange + data)[-STRANGE_BYTES:]
+        return found
 
     def decode_packet(self, packet: Packet, time_s: float) -> list[Event]:
         """The events of one packet."""

@@ -150,6 +150,7 @@ class Surveyor:
             packets=self._packets,
             bad_bytes=counters.bad_bytes,
             read_bytes=self._bytes,
+            strange=self._codec.strange,
             rivals=tuple(self._rivals.values()),
         )
 

@@ -76,6 +76,8 @@ class Survey:
     """What to do about it."""
     unbelieved: int | None = None
     """The system id of a rover whose packets are refused, because they are not signed with the companion's key."""
+    strange: bytes = b""
+    """The newest bytes of a link on which no packet has come; empty if one has."""
     wired: bool = False
     """Whether there are lidars on serial ports of the companion."""
     lost: int = 0

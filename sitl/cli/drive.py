@@ -17,6 +17,7 @@ from companion.cli.inputs import EXIT_BAD_INPUT, EXIT_NOT_WRITTEN, Laps, OutputE
 from companion.cli.source import warn_of_places, warning
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
+from companion.core.interrupts import is_interrupt
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
 from companion.lidar.spec import LidarError, LidarSpec, parsed
@@ -133,7 +134,9 @@ def drive(
         _end(page, run.ended_by(EndReason.TIME_LIMIT))
     except BAD_INPUT as error:
         raise _refused(error) from error
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemError) as error:
+        if not is_interrupt(error):
+            raise
         _print_last(painter, rows_below=1)
         _end(page, EndReason.STOPPED_BY_USER)
         _keep(run, recorder)

@@ -13,7 +13,7 @@ import math
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 import shapely
@@ -24,8 +24,9 @@ from shapely.geometry.base import BaseGeometry
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Grid
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.mission import MoverSpec
-from companion.mission.tables import FileName, Metres, Name, Pair, Positive, Table, named
+from companion.mission.tables import FileName, Name, Positive, Table, named
 from companion.mission.toml_reader import MoverTable
+from companion.mission.world_shapes import ObstacleTable, ShapeTable
 from companion.storage.toml_file import read_table
 from sitl.world.doors import FOR_EVER_MS, Door, whole_ms
 from sitl.world.movers import Announcement, Mover, timed_track
@@ -35,42 +36,6 @@ FINE_M = 0.1
 MAX_FIELDS = 10_000_000
 Mask = NDArray[np.bool_]
 Seconds = Annotated[float, Field(ge=0.0, le=1e6)]
-
-
-class ShapeTable(Table):
-    """A polygon, a line with a width, or a circle."""
-
-    polygon_m: Annotated[list[Pair], Field(min_length=3)] | None = None
-    line_m: Annotated[list[Pair], Field(min_length=2)] | None = None
-    width_m: Positive | None = None
-    north_m: Metres | None = None
-    east_m: Metres | None = None
-    radius_m: Positive | None = None
-
-    def shape(self) -> BaseGeometry:
-        """The shape, x east, y north. Raises ValueError unless there is exactly one."""
-        circle = (self.north_m, self.east_m, self.radius_m)
-        if (self.line_m is None) != (self.width_m is None):
-            raise ValueError("a line needs line_m and width_m")
-        if any(part is None for part in circle) and any(part is not None for part in circle):
-            raise ValueError("a circle needs north_m, east_m and radius_m")
-        shapes: list[BaseGeometry] = []
-        if self.polygon_m is not None:
-            shapes.append(_polygon([(east, north) for north, east in self.polygon_m]))
-        if self.line_m is not None and self.width_m is not None:
-            line = shapely.LineString([(east, north) for north, east in self.line_m])
-            shapes.append(line.buffer(self.width_m / 2.0, cap_style="flat", join_style="mitre"))
-        if self.north_m is not None and self.east_m is not None and self.radius_m is not None:
-            shapes.append(shapely.Point(self.east_m, self.north_m).buffer(self.radius_m))
-        if len(shapes) != 1:
-            raise ValueError(f"exactly one of polygon_m, line_m and circle is needed, not {len(shapes)}")
-        return shapes[0]
-
-
-class ObstacleTable(ShapeTable):
-    """``[[obstacle]]``."""
-
-    material: Literal["solid", "glass", "black"] = "solid"
 
 
 class DoorTable(ObstacleTable):
@@ -246,13 +211,6 @@ class _Drawing:
                 f"{size_m[0]:g} m east and {size_m[1]:g} m north; {remedy}"
             )
         return shape
-
-
-def _polygon(corners: list[tuple[float, float]]) -> BaseGeometry:
-    polygon = shapely.Polygon(corners)
-    if not polygon.is_valid or polygon.area == 0.0:
-        raise ValueError("polygon_m: not a simple polygon: its sides cross or touch")
-    return polygon
 
 
 def _base(path: Path, table: WorldTable) -> tuple[Mask, float]:

@@ -1,5 +1,6 @@
 """How the scripts begin and end: wrong usage and an interrupt during the imports."""
 
+import json
 import os
 import signal
 import subprocess
@@ -9,8 +10,10 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
+from PIL import Image
 from typer.testing import CliRunner
 
 from companion.cli.commands import app as companion_commands
@@ -18,7 +21,7 @@ from companion.cli.entry import StoppedError, start
 from companion.recording.reader import load_record
 from companion.safety.reasons import EndReason
 from sitl.cli.commands import app as sitl_commands
-from tests.support.forked import run
+from tests.support.forked import Forked, run
 from tests.support.quick import first_of
 from tests.support.served import PATIENCE_S, finished, process, slowness
 
@@ -116,6 +119,41 @@ def test_an_interrupt_inside_a_compiled_loop_ends_a_command_like_any_other(capsy
     assert capsys.readouterr().err == "script: stopped by Ctrl-C\n"
     with pytest.raises(SystemError, match="bad call"):
         start("script", lambda: partial(app, ["broken"]))
+
+
+def test_ctrl_c_in_the_middle_of_a_compiled_search_is_one_line(tmp_path: Path) -> None:
+    """A real one: a large map of passages to and fro, whose search lasts far longer than the signal needs to arrive."""
+    pixels = np.full((1500, 1500), 255, dtype=np.uint8)
+    pixels[:, 4::4] = 0
+    pixels[0, 4::8] = pixels[-1, 8::8] = 255
+    Image.fromarray(pixels).save(tmp_path / "passages.png")
+    # It says when it begins: before that, an interrupt meets no compiled loop.
+    said = """
+import companion.cli.plan as plan
+budget_of = plan.budget_of
+plan.budget_of = lambda effort: print("searches", flush=True) or budget_of(effort)
+"""
+    ends = ("--start", "0,0", "--target", "1498,700", "--planner", "dijkstra")
+    with Forked("companion", ["plan", tmp_path / "passages.png", *ends], first=said) as child:
+        assert child.stdout.readline() == "searches\n"
+        time.sleep(0.05)
+        child.send_signal(signal.SIGINT)
+        out, errors = child.communicate(timeout=PATIENCE_S)
+    assert (child.returncode, out, errors) == (130, "", "rover-companion: stopped by Ctrl-C\n")
+
+
+def test_a_drive_interrupted_in_a_compiled_loop_keeps_its_record_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*arguments: object, **options: object) -> None:
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("sitl.cli.drive.Drive", interrupted)
+    record = tmp_path / "record"
+    drive = ["drive", "missions/open.toml", "--record", str(record)]
+    assert start("rover-sitl", lambda: partial(sitl_commands, drive)) == 130
+    assert capsys.readouterr().err.endswith(f"rover-companion report {record} shows it\n")
+    assert json.loads((record / "meta.json").read_text())["stopped_by_user"] is True
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

@@ -198,6 +198,10 @@ def test_what_drive_would_refuse_is_refused_here_too(tmp_path: Path) -> None:
         ),
         ('[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.png"\nstart = [30, 3]\n', "lies outside the world"),
         ('[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.png"\nstart = [4, 3]\n', "4, 3 is an obstacle in"),
+        (
+            '[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.toml"\nstart = [8, 3]\n',
+            "sitl.start: field 8, 3 touches an obstacle of",
+        ),
     ],
     ids=[
         "a world file",
@@ -206,10 +210,11 @@ def test_what_drive_would_refuse_is_refused_here_too(tmp_path: Path) -> None:
         "a start outside a world file",
         "a start outside a picture",
         "a start on a wall of a picture",
+        "a start on a wall of a world file",
     ],
 )
 def test_mistakes_that_people_make_are_named(tmp_path: Path, text: str, says: str) -> None:
-    (tmp_path / "w.toml").write_text("size_m = [40, 20]\n")
+    (tmp_path / "w.toml").write_text("size_m = [40, 20]\n[[obstacle]]\nline_m = [[2, 8.9], [5, 8.9]]\nwidth_m = 0.4\n")
     picture = Image.new("L", (30, 20), 255)
     picture.putpixel((4, 16), 0)
     picture.save(tmp_path / "w.png")
@@ -223,6 +228,7 @@ def test_mistakes_that_people_make_are_named(tmp_path: Path, text: str, says: st
         text.replace("200", "20")
         .replace("30, 3", "29, 3")
         .replace("[4, 3]", "[5, 3]")
+        .replace("[8, 3]", "[9, 3]")
         .replace("18,0, 3", "18, 3")
         .replace("18,0", "18.0")
     )

@@ -34,13 +34,14 @@ def test_serving_gives_the_terminal_back_and_needs_no_colours(tmp_path: Path) ->
 
 
 @pytest.mark.thorough
-def test_driving_gives_the_terminal_back_when_it_is_ended(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
+def test_driving_gives_the_terminal_back_when_it_is_ended(tmp_path: Path, number: signal.Signals, word: str) -> None:
     mission = tmp_path / "open.toml"
     mission.write_text(MISSION.replace("20, 20", "2000, 20").replace("9, 9", "1990, 9"))
     with on_a_terminal("sitl", "drive", mission, "--view") as drawn:
         assert drawn.read_until(b"GUIDED")
-        assert ended(drawn, signal.SIGTERM) == 130
-    assert b"stopped by SIGTERM" in drawn.last and b"Traceback" not in drawn.written
+        assert ended(drawn, number) == 130
+    assert f"stopped by {word}".encode() in drawn.last and b"Traceback" not in drawn.written
 
 
 @first_of(1, ("columns", "rows"), [(40, 10), (80, 24)])
