@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import typer
@@ -94,58 +94,53 @@ def drive(
     console, wanted = Console(), outputs(image, map_stem, json_file, report_file, record)
     recorder: Recorder | NullRecorder = NullRecorder()
     run: Drive | None = None
-    page: LiveViewer | None = None
     usual = options.VIEWED_SPEEDUP if view else options.WEB_SPEEDUP if web else None
     pace = Pace(usual if speedup is None else speedup, WallClock())
     try:
         painter, page = _painter(view), web_viewer(web, web_token, _warn, actions=web_actions)
-        settings = usable_settings(settings_file)
-        where = OnWorld(world, start, target, resolution_m, top_left, prior)
-        given = Given(resolution_m if world is None else None, radius_m, speed_m_s)
-        chosen = mission_to_drive(mission_file, where, given, skip_unknown=skip_unknown, laps=laps)
-        lidars = tuple(map(_simulated_lidar, lidar or ()))
-        mission = equipped(chosen, "none" if lidars and sensors is None else sensors, params)
-        scenario = _simulated(mission, faults, lidars)
-        files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
-        wanted.check((*files.values(), *mission.files))
-        folder = context.with_resource(wanted.record_folder())
-        if folder is not None:
-            recorder = Recorder(
-                folder,
-                mission,
-                settings,
-                seed,
-                arm=True,
-                files=files,
-                start_us=RECORD_START_US,
-                lidars=[one.text for one in lidars],
-            )
-        with console.status("loading the planner ..."):
-            _say_if_compiling(settings, mission)
-            run = Drive(
-                mission, scenario, settings, seed, recorder, time_limit_s, station=page.station if page else None,
-                lidars=lidars,
-            )  # fmt: skip
-        also = Also() if page is None else _shown(run, page, settings)
-        if painter is None:
-            report = run_with_progress(run, console, pace, also)
-        else:
-            report = run_with_view(run, painter, _paced(run, pace, also), also)
-        _end(page, run.ended_by(EndReason.TIME_LIMIT))
+        with _telling(page):
+            settings = usable_settings(settings_file)
+            where = OnWorld(world, start, target, resolution_m, top_left, prior)
+            given = Given(resolution_m if world is None else None, radius_m, speed_m_s)
+            chosen = mission_to_drive(mission_file, where, given, skip_unknown=skip_unknown, laps=laps)
+            lidars = tuple(map(_simulated_lidar, lidar or ()))
+            mission = equipped(chosen, "none" if lidars and sensors is None else sensors, params)
+            scenario = _simulated(mission, faults, lidars)
+            files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
+            wanted.check((*files.values(), *mission.files))
+            folder = context.with_resource(wanted.record_folder())
+            if folder is not None:
+                recorder = Recorder(
+                    folder,
+                    mission,
+                    settings,
+                    seed,
+                    arm=True,
+                    files=files,
+                    start_us=RECORD_START_US,
+                    lidars=[one.text for one in lidars],
+                )
+            with console.status("loading the planner ..."):
+                _say_if_compiling(settings, mission)
+                run = Drive(
+                    mission, scenario, settings, seed, recorder, time_limit_s, station=page.station if page else None,
+                    lidars=lidars,
+                )  # fmt: skip
+            also = Also() if page is None else _shown(run, page, settings)
+            if painter is None:
+                report = run_with_progress(run, console, pace, also)
+            else:
+                report = run_with_view(run, painter, _paced(run, pace, also), also)
+            if page is not None:
+                page.end(run.ended_by(EndReason.TIME_LIMIT))
     except BAD_INPUT as error:
         raise _refused(error) from error
     except (KeyboardInterrupt, SystemError) as error:
         if not is_interrupt(error):
             raise
         _print_last(painter, rows_below=1)
-        _end(page, EndReason.STOPPED_BY_USER)
         _keep(run, recorder)
         raise StoppedError(_stopped(run, recorder if record else NullRecorder())) from None
-    except Exception as error:
-        _fail(page, error)
-        raise
-    finally:
-        _closed(page)
     recorder.close(ended_by=run.ended_by(EndReason.TIME_LIMIT))
     _print_results(report, console, mission, settings)
     _print_last(painter, wanted.lines + isinstance(recorder, Recorder))
@@ -239,20 +234,22 @@ def _say_if_compiling(settings: Settings, mission: Mission) -> None:
         typer.echo(COMPILING, err=True)
 
 
-def _end(page: LiveViewer | None, reason: EndReason) -> None:
-    """How it ended, for the page, where the companion did not end it."""
-    if page is not None:
-        page.end(reason)
-
-
-def _fail(page: LiveViewer | None, error: Exception) -> None:
-    if page is not None:
-        page.fail(error)
-
-
-def _closed(page: LiveViewer | None) -> None:
-    if page is not None:
-        page.close()
+@contextlib.contextmanager
+def _telling(page: LiveViewer | None) -> Iterator[None]:
+    """The page is told how a drive ended that was broken off, and is closed."""
+    try:
+        yield
+    except BAD_INPUT:
+        raise
+    except (KeyboardInterrupt, Exception) as error:
+        if page is not None and is_interrupt(error):
+            page.end(EndReason.STOPPED_BY_USER)
+        elif page is not None and isinstance(error, Exception):
+            page.fail(error)
+        raise
+    finally:
+        if page is not None:
+            page.close()
 
 
 def _shown(run: Drive, page: LiveViewer, settings: Settings) -> Also:
