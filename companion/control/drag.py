@@ -4,8 +4,8 @@ Such a rover is held by the ground: gravel, grass, a slope. ArduRover opens the 
 is told, and closes it slowly, also when it is told to stop. Where such ground ends the rover shoots ahead. So the more
 it is held, the more room its positions get and the sooner it brakes.
 
-A rover that such ground holds rolls on for seconds after it was told to stand, until the throttle is closed. Told to
-roll back, it stands after half the way.
+A rover that such ground holds, or has just let go, rolls on for seconds after it was told to stand, until the throttle
+is closed. Told to roll back, it stands after half the way.
 
 Nouns: drag watch.
 """
@@ -33,6 +33,8 @@ BACK_M_S = (1.0, 0.5, 0.25)
 """How fast it is told to roll back, tried in turn. Slower ones brake less, faster ones no better."""
 STALE_S = 0.5
 """An older reading of the throttle says nothing."""
+CLOSES_S = 3.0
+"""So long ArduRover may take to close the throttle of a rover that the ground has let go."""
 
 
 class DragWatch:
@@ -41,6 +43,7 @@ class DragWatch:
     def __init__(self) -> None:
         self._time_s = -math.inf
         self._held_m_s = 0.0
+        self._held_until_s = -math.inf
 
     def held_m_s(self, throttle: ThrottleSeen | None, full_m_s: float, view: LocalView) -> float:
         """Once a tick: how much slower the rover is, or was just now, than firm ground would let it go.
@@ -54,16 +57,22 @@ class DragWatch:
         if throttle is not None and now_s - throttle.time_s < STALE_S:
             held_m_s = max(throttle.share * full_m_s - view.speed_m_s - SLACK_M_S, 0.0)
         self._held_m_s = max(held_m_s, kept * self._held_m_s)
+        if self._held_m_s >= HELD_M_S:
+            self._held_until_s = now_s
         return self._held_m_s
 
+    def closes(self) -> bool:
+        """Whether the throttle may still be open from when the ground held the rover."""
+        return self._time_s - self._held_until_s < CLOSES_S
 
-def braked_harder(command: ControlCommand, view: LocalView, bounds: Bounds) -> ControlCommand:
+
+def braked_harder(command: ControlCommand, view: LocalView, bounds: Bounds, *, closes: bool) -> ControlCommand:
     """The command; or, where it tells a rover to stand that the ground holds and that rolls on, to roll back.
 
-    Only as fast as the rover may be left alone with.
+    ``closes``: or has held, see ``DragWatch``. Only as fast as the rover may be left alone with.
     """
     stands = command.setpoint == GuidedVelocity(0.0, 0.0)
-    if not stands or view.held_m_s < HELD_M_S or view.forward_m_s < ROLLS_M_S:
+    if not stands or not closes or view.forward_m_s < ROLLS_M_S:
         return command
     for speed_m_s in BACK_M_S:
         back = GuidedVelocity(-speed_m_s, 0.0)

@@ -207,7 +207,7 @@ class MissionRun:
         executor.learn(view)
         wanted = executor.guide(task, view)
         wanted = self.legs.guide(wanted, executor, view)
-        wanted = braked_harder(wanted, view, executor.layout.bounds)
+        wanted = braked_harder(wanted, view, executor.layout.bounds, closes=self._drag.closes())
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)
 
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:

@@ -26,6 +26,9 @@ from companion.planning.problem import Path, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, cells_cost, first_fault, plain
 
 BACKTRACK_TRIES = 8
+SMALL_M, SPUR_M, SPUR_RATIO = 0.5, 3.0, 3
+"""With fields so small the rover leaves out, on its way back, what it drove between two places so near to each other,
+if that is so many times as long as the straight way."""
 NEVER = 2**62
 
 
@@ -192,6 +195,8 @@ def simplified(past: tuple[Cell, ...]) -> tuple[Cell, ...]:
 def _return(state: NavState, grid: Grid, search: Search, *, entered: bool) -> tuple[NavState, Decision]:
     """Part A (figure 12): search if it is due, else one more field back."""
     searches: tuple[SearchKind, ...] = ()
+    if entered:
+        state = replace(state, past=_without_spur(state.past, grid))
     at_start = len(state.past) == 1
     due = state.until_search - (1 if entered else 0)
     proved = False
@@ -303,6 +308,25 @@ def _retraced(past: tuple[Cell, ...], cell: Cell) -> tuple[Cell, ...]:
     if gaps[nearest] == 0:
         return past[: nearest + 1]
     return (*past[: nearest + 1], *fields_between(past[nearest], cell), cell)
+
+
+def _without_spur(past: tuple[Cell, ...], grid: Grid) -> tuple[Cell, ...]:
+    """The past path without a spur at its end: straight to the rover from the earliest field where it began.
+
+    Where fields are much smaller than the rover, it does not drive back through each of them. Beside its past path it
+    leaves a new one, and would be led back to where it left the old one, and to and fro.
+    """
+    if grid.resolution_m > SMALL_M:
+        return past
+    reach, here = int(SPUR_M / grid.resolution_m), past[-1]
+    for i, cell in enumerate(past):
+        gap = max(abs(cell.x - here.x), abs(cell.y - here.y))
+        if gap > reach or len(past) - 1 - i < SPUR_RATIO * max(gap, 1):
+            continue
+        straight = (here, *fields_between(here, cell), cell)
+        if is_clear(grid, straight):
+            return (*past[:i], *reversed(straight))
+    return past
 
 
 def _place_on(cells: CellArray, index: int, cell: Cell) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from companion.control.controller import ControlCommand, Purpose
-from companion.control.drag import BACK_M_S, FORGOTTEN_S, SLACK_M_S, STALE_S, DragWatch, braked_harder
+from companion.control.drag import BACK_M_S, CLOSES_S, FORGOTTEN_S, SLACK_M_S, STALE_S, DragWatch, braked_harder
 from companion.control.local_view import MOST_FURTHER_M, LocalView
 from companion.core.frames import Pose
 from companion.mission.bounds import Bounds
@@ -74,11 +74,24 @@ def held_back() -> LocalView:
 
 def test_a_rover_that_is_held_and_rolls_on_is_told_to_roll_back_until_it_stands() -> None:
     held = held_back()
-    back = braked_harder(STAND, held, Bounds())
+    back = braked_harder(STAND, held, Bounds(), closes=True)
     assert back.purpose is Purpose.BRAKE
     assert isinstance(back.setpoint, GuidedVelocity) and back.setpoint == GuidedVelocity(-BACK_M_S[0], 0.0)
-    for free in (replace(held, held_m_s=0.1), replace(held, speed_m_s=0.05), replace(held, rolls_back=True)):
-        assert braked_harder(STAND, free, Bounds()) == STAND
+    assert braked_harder(STAND, held, Bounds(), closes=False) == STAND
+    for stands in (replace(held, speed_m_s=0.05), replace(held, rolls_back=True)):
+        assert braked_harder(STAND, stands, Bounds(), closes=True) == STAND
+
+
+def test_the_throttle_may_still_be_open_for_a_while_after_the_ground_has_let_it_go() -> None:
+    watch = DragWatch()
+    held_m_s(watch, 0.1, 1.0)
+    assert not watch.closes()
+    held_m_s(watch, 0.5, 0.5, 1.0)
+    assert watch.closes()
+    held_m_s(watch, 0.2, 1.0, 0.9 + CLOSES_S)
+    assert watch.closes()
+    held_m_s(watch, 0.2, 1.0, 4.0 + CLOSES_S)
+    assert not watch.closes()
 
 
 def test_any_other_command_stays_as_it_is() -> None:
@@ -89,7 +102,7 @@ def test_any_other_command_stays_as_it_is() -> None:
         GuidedHeading(1.0),
     ):
         command = ControlCommand(Purpose.DRIVE, setpoint, 1.0)
-        assert braked_harder(command, held_back(), Bounds()) == command
+        assert braked_harder(command, held_back(), Bounds(), closes=True) == command
 
 
 @pytest.mark.parametrize(("wall_m", "back_m_s"), [(7.0, 1.0), (3.5, 0.5), (2.0, 0.25), (0.6, 0.0)])
@@ -100,4 +113,4 @@ def test_it_is_told_no_more_than_it_may_be_left_alone_with(wall_m: float, back_m
     for east_m in np.arange(8.0, 12.0, 0.2):
         put(map_, pose.north_m - wall_m, float(east_m))
     held = replace(view(map_, pose, 0.3), held_m_s=1.0)
-    assert braked_harder(STAND, held, Bounds()).setpoint == GuidedVelocity(-back_m_s, 0.0)
+    assert braked_harder(STAND, held, Bounds(), closes=True).setpoint == GuidedVelocity(-back_m_s, 0.0)
