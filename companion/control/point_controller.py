@@ -55,6 +55,8 @@ class PointController:
 
     def __init__(self) -> None:
         self._looking_rad: float | None = None
+        self._looked = False
+        """It has looked, there was nothing, and it turns to where it drives: with as little reach as any other."""
         self._braking = False
         self._swinging = False
         self._anew_s: float | None = None
@@ -68,6 +70,7 @@ class PointController:
         command = self._begun_anew(self._command(path, view), view)
         self._braking = command.purpose is Purpose.BRAKE
         self._looking_rad = command.setpoint.heading_rad if isinstance(command.setpoint, GuidedHeading) else None
+        self._looked = self._looked and self._looking_rad is not None
         return command
 
     def _begun_anew(self, command: ControlCommand, view: LocalView) -> ControlCommand:
@@ -113,7 +116,8 @@ class PointController:
             needed_m + (settings.brake_on_m if self._braking else 0.0), distance_m - 0.1
         ):
             return stop_for(Purpose.BRAKE)
-        wanted_m = settings.least_reach_m if self._looking_rad is None else _reach_after_look_m(view)
+        looks = self._looking_rad is not None and not self._looked
+        wanted_m = _reach_after_look_m(view) if looks else settings.least_reach_m
         short = reach.distance_m < min(wanted_m, distance_m - 0.1) and not at_end
         if short or reach.distance_m == 0.0:
             if self._looking_rad is not None and not _is_turned_to(self._looking_rad, pose, settings):
@@ -121,6 +125,7 @@ class PointController:
             look = _look_or_blocked(path, view)
             if look.purpose is not Purpose.DRIVE or reach.distance_m < settings.least_reach_m:
                 return look
+            self._looked = True
         return self._drive(path, reach, view)
 
     def _drive(self, path: ReferencePath, reach: Reach, view: LocalView) -> ControlCommand:

@@ -35,9 +35,9 @@ from companion.navigation.field_step import (
     abandon_path,
     follows_clear_path,
     initial_state,
-    is_clear,
     retrace,
     step,
+    way_back_is_clear,
 )
 from companion.navigation.search_budget import PathSearcher, kinematics_of
 from companion.navigation.step_runner import StepRunner
@@ -315,7 +315,7 @@ class GoalDriver:
         if cell != self._state.past[-1] or self.decision is None:
             return True
         if self._state.returning:
-            return not is_clear(view.evidence.grid, self._state.past[:-4:-1])
+            return not way_back_is_clear(self._state, view.evidence.grid, 3)
         return not follows_clear_path(self._state, view.evidence.grid)
 
     def _lay_path(self, decision: Decision, view: LocalView) -> None:

@@ -29,6 +29,8 @@ BACKTRACK_TRIES = 8
 SMALL_M, SPUR_M, SPUR_RATIO = 0.5, 3.0, 3
 """With fields so small the rover leaves out, on its way back, what it drove between two places so near to each other,
 if that is so many times as long as the straight way."""
+AHEAD_M = 2.0
+"""So far ahead the way back must be clear."""
 NEVER = 2**62
 
 
@@ -153,6 +155,12 @@ def follows_clear_path(state: NavState, grid: Grid) -> bool:
     return state.current is not None and is_clear(grid, state.current.cell_array[state.index :], state.driven)
 
 
+def way_back_is_clear(state: NavState, grid: Grid, fields: int) -> bool:
+    """Whether so many fields of the past path are clear, the rover's own with them; more if ``AHEAD_M`` has more."""
+    fields = max(fields, round(AHEAD_M / grid.resolution_m))
+    return is_clear(grid, state.past[: -fields - 1 : -1])
+
+
 def is_clear(grid: Grid, cells: CellArray | tuple[Cell, ...], driven: Steps = frozenset()) -> bool:
     """Whether none of these fields but the first (where the rover is) is an obstacle, and no step cuts a corner.
 
@@ -213,7 +221,7 @@ def _return(state: NavState, grid: Grid, search: Search, *, entered: bool) -> tu
     if at_start:
         reason = DecisionReason.NO_PATH_LEFT
         return state, Decision(Action.UNREACHABLE, Part.RETURN, (), None, reason, searches, proved)
-    if not is_clear(grid, state.past[:-3:-1]):
+    if not way_back_is_clear(state, grid, 2):
         return _repair_past(state, grid, search, searches)
     return state, Decision(
         Action.BACKTRACK, Part.RETURN, state.past[::-1], None, DecisionReason.GOING_BACK, searches, proved

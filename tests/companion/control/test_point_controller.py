@@ -370,3 +370,25 @@ def test_where_its_path_ends_and_it_can_be_sent_nowhere_it_does_not_drive():
     ground.map.log_odds[:] = 0.0
     path = ReferencePath(np.array([[HERE.north_m, HERE.east_m], [HERE.north_m + 0.05, HERE.east_m]]))
     assert told(ground, here, path=path).purpose is not Purpose.DRIVE
+
+
+@pytest.mark.parametrize("seed", [47, 102, 203, 498, 502])
+def test_a_rover_that_turns_as_told_has_soon_looked_enough(seed):
+    """Round a bend behind posts: where a look shows nothing it drives, and does not turn to and fro."""
+    rng = np.random.default_rng(seed)
+    posts = [
+        (HERE.north_m + north, HERE.east_m + east, 0.25)
+        for north, east in rng.uniform(-3.0, 3.0, (8, 2))
+        if math.hypot(north, east) > 0.75
+    ]
+    corners = np.cumsum([(HERE.north_m, HERE.east_m), (0.7, 0.5), (0.8, -0.6), (0.5, -0.9), (1.2, -1.5)], axis=0)
+    along = np.linspace(0.0, 4.0, 20)
+    path = ReferencePath(np.column_stack([np.interp(along, np.arange(5.0), corners[:, axis]) for axis in range(2)]))
+    controller, pose, ground = PointController(), HERE, Ground()
+    for _ in range(6):
+        ground.look_round(pose, posts, 10)
+        answer = controller.follow(path, view(ground, pose))
+        if not isinstance(answer.setpoint, GuidedHeading):
+            return
+        pose = Pose(pose.north_m, pose.east_m, answer.setpoint.heading_rad, pose.time_s + 2.0)
+    raise AssertionError("it still turns")

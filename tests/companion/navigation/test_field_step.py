@@ -217,6 +217,32 @@ def test_returning_a_corner_cut_by_the_rover_drops_the_fields_between():
     assert state.past == past[:3]
 
 
+SPUR = (*(Cell(x, 0) for x in range(10)), *(Cell(x, 2) for x in range(9, 3, -1)))
+"""To the east, and beside that back to the west."""
+STRAIGHT = (Cell(0, 0), Cell(1, 1), Cell(2, 1), Cell(3, 2))
+
+
+@pytest.mark.parametrize(("resolution_m", "left"), [(0.2, STRAIGHT), (1.0, (*SPUR, Cell(3, 2)))])
+def test_returning_over_small_fields_a_spur_beside_the_past_path_is_left_out(resolution_m, left):
+    grid = Grid(ground().weights, resolution_m)
+    state, decision = step(returning(SPUR), grid, Cell(3, 2), unused)
+    assert state.past == left and decision.path == left[::-1]
+
+
+def test_returning_over_small_fields_no_spur_is_left_out_through_a_wall():
+    grid = Grid(ground("..........", "##########", "..........").weights, 0.2)
+    state, _ = step(returning(SPUR), grid, Cell(3, 2), Scripted(NEVER))
+    assert state.past == (*SPUR, Cell(3, 2))
+
+
+@pytest.mark.parametrize("resolution_m, mended", [(0.2, True), (1.0, False)])
+def test_small_fields_of_the_past_path_are_looked_at_farther_ahead(resolution_m, mended):
+    """What blocks it four fields ahead is 0.8 m away, or 4 m."""
+    grid = Grid(ground("..........", "..........", "..#.......").weights, resolution_m)
+    _, decision = step(returning(ROW[:7]), grid, ROW[6], Scripted(NEVER) if mended else unused)
+    assert (decision.reason is not DecisionReason.GOING_BACK) == mended
+
+
 # --- the way back is blocked (ours) ----------------------------------------------------------------------------------
 
 
