@@ -187,7 +187,8 @@ def _file(sensors: str | None) -> Path | None:
 
 def _keep(run: Drive | None, recorder: Recorder | NullRecorder) -> None:
     """What was recorded of a drive that was interrupted."""
-    recorder.close(ended_by=None if run is None else run.ended_by(EndReason.STOPPED_BY_USER))
+    stopped = EndReason.STOPPED_BY_USER
+    recorder.close(ended_by=stopped if run is None else run.ended_by(stopped))
     if run is not None and isinstance(recorder, Recorder) and not recorder.problem:
         with contextlib.suppress(OutputError, MapError):  # the program ends with what it can say
             complete_record(run, recorder)

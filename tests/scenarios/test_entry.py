@@ -153,7 +153,7 @@ def test_a_drive_interrupted_in_a_compiled_loop_keeps_its_record_all_the_same(
     drive = ["drive", "missions/open.toml", "--record", str(record)]
     assert start("rover-sitl", lambda: partial(sitl_commands, drive)) == 130
     assert capsys.readouterr().err.endswith(f"rover-companion report {record} shows it\n")
-    assert json.loads((record / "meta.json").read_text())["stopped_by_user"] is True
+    assert json.loads((record / "meta.json").read_text())["ended_by"] == EndReason.STOPPED_BY_USER.name
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
