@@ -29,7 +29,7 @@ NEAR_M = 8.0
 KEYS = {
     "kind", "t", "pose", "speed", "turn", "mode", "armed", "drives", "line", "why", "state", "statuses", "goal", "path",
     "motion", "setpoint", "rays", "movers", "figures", "battery", "gps", "decision", "guard", "news", "rates",
-    "contacts", "touched", "paused",
+    "contacts", "touched", "paused", "held_up",
 }  # fmt: skip
 
 
