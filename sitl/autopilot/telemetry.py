@@ -214,7 +214,9 @@ def _position_target(vehicle: Vehicle) -> list[Any]:
 def _servos(vehicle: Vehicle) -> list[Any]:
     control = vehicle.control[0]
     first, third = (1500 + round(500 * float(control[servo])) for servo in ("servo_1", "servo_3"))
-    return [mavlink.MAVLink_servo_output_raw_message(vehicle.time_us, 0, first, 0, third, 0, 0, 0, 0, 0)]
+    # The field has 32 bits: after 71 minutes it begins anew, as the autopilot's does.
+    time_us = vehicle.time_us % 2**32
+    return [mavlink.MAVLink_servo_output_raw_message(time_us, 0, first, 0, third, 0, 0, 0, 0, 0)]
 
 
 def _simstate(vehicle: Vehicle) -> list[Any]:

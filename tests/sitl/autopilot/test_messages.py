@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sitl.autopilot import telemetry
 from sitl.world import geodesy
 from tests.support.mission_client import ORIGIN
 from tests.support.sitl_client import READY_S, Client, open_ground, ready
@@ -107,3 +110,10 @@ def test_a_joystick_is_a_sign_of_life() -> None:
     assert "Radio Failsafe" not in client.texts()
     client.run_for(8.0)
     assert "Radio Failsafe" in client.texts()
+
+
+def test_after_71_minutes_the_time_of_servo_outputs_begins_anew() -> None:
+    """Its field has 32 bits and counts microseconds."""
+    vehicle: Any = SimpleNamespace(time_us=2**32 + 7, control=[{"servo_1": 0.0, "servo_3": 0.5}])
+    (message,) = telemetry._servos(vehicle)
+    assert mavlink.MAVLink(None).parse_buffer(message.pack(mavlink.MAVLink(None)))[0].time_usec == 7
