@@ -156,7 +156,7 @@ def follows_clear_path(state: NavState, grid: Grid) -> bool:
 
 
 def way_back_is_clear(state: NavState, grid: Grid, fields: int) -> bool:
-    """Whether so many fields of the past path are clear, the rover's own with them; more if ``AHEAD_M`` has more."""
+    """Whether the next fields of the past path are clear: so many, with the rover's own, and all in ``AHEAD_M``."""
     fields = max(fields, round(AHEAD_M / grid.resolution_m))
     return is_clear(grid, state.past[: -fields - 1 : -1])
 
