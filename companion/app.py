@@ -25,7 +25,7 @@ from companion.mission.mission import Mission
 from companion.navigation.step_runner import StepRunner
 from companion.operator.notifications import News, Outcome, Status, status_of
 from companion.recording.recorder import RunLog
-from companion.safety.reasons import EndReason
+from companion.safety.reasons import EndReason, Parting, Reason
 from companion.settings import Settings
 from companion.supervision.assembly import Options, assemble
 from companion.vehicle.state import VehicleState
@@ -64,12 +64,13 @@ class Companion:
         self._operator_server = made.operator_server
         self._supervisor = made.supervisor
         self._notifier = made.notifier
+        self._ticked_s = clock.now_s()
         self.mission_run = made.run
         self.outcome = made.outcome
 
     def tick(self) -> None:
         """One tick: sleep, listen, map, answer, supervise, decide, guide, speak, conclude."""
-        now_s = self._pace.sleep()
+        now_s = self._ticked_s = self._pace.sleep()
         scans = self._dispatcher.listen(now_s)
         self.mission_run.map(scans)
         self._operator_server.answer(now_s)
@@ -100,6 +101,11 @@ class Companion:
     def done(self) -> bool:
         """Whether the mission has ended, one way or another."""
         return self._supervisor.done
+
+    @property
+    def parting(self) -> Reason[Parting] | None:
+        """How the rover is left, as of the last tick; None where nobody must know."""
+        return self._supervisor.parting(self._ticked_s)
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""

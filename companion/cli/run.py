@@ -314,6 +314,8 @@ def _ended(companion: Companion, rig: _Rig) -> int:
     code = _print_statuses(companion.statuses(), companion.outcome.broken_off)
     code = code if companion.complete else EXIT_MISSED
     with contextlib.suppress(OSError):  # no reader: the exit code remains
+        if companion.parting is not None:
+            typer.echo(companion.parting, err=True)
         for line in (*companion.command_lines(), *map(str, companion.laps)):
             typer.echo(line)
         if any(status is TargetStatus.UNREACHABLE for _, status in companion.statuses()):

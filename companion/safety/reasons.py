@@ -137,6 +137,14 @@ class EndReason(Enum):
     BATTERY = "{}"
 
 
+class Parting(Enum):
+    """How a run leaves the rover, where a person who walks up to it must know."""
+
+    ARMED = "the rover is still armed, in {}"
+    NOT_HELD = "the rover is still armed, and has not confirmed HOLD"
+    SILENT = "the autopilot is silent: whether the rover stands is not known"
+
+
 class Refusal(Enum):
     """Why what a person asks for is not done."""
 

@@ -13,10 +13,11 @@ from companion.core.severity import Severity, TextSink
 from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.mode_latch import Control
-from companion.safety.reasons import EndReason, Reason
+from companion.safety.reasons import EndReason, Parting, Reason
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import SetMode
 from companion.vehicle.events import RoverMode
+from companion.vehicle.mode_names import mode_name
 from companion.vehicle.state import fold
 
 CONFIRM_S = 0.7
@@ -52,14 +53,14 @@ class Shutdown:
         self._again_s = now_s + AGAIN_S
         self.stopped_ours = True
         if why.kind is not EndReason.DONE:
-            self._notifier.tell(f"Companion: {why}, HOLD", Severity.WARNING)
+            hold = "HOLD asked for, but the autopilot is silent" if self._is_silent(now_s) else "HOLD"
+            self._notifier.tell(f"Companion: {why}, {hold}", Severity.WARNING)
 
     def is_over(self, now_s: float) -> bool:
         """Whether the rover is no longer ours, or has said that it will be in HOLD, or time is up."""
-        vehicle, ack = self._run.vehicle, self._autopilot.last_ack(SetMode(RoverMode.HOLD))
-        answered = ack is not None and ack.result == 0 and ack.time_s > self._leave_at_s - CONFIRM_S
+        vehicle = self._run.vehicle
         left = vehicle.heartbeat is not None and not vehicle.is_ours
-        over = answered or left or now_s >= self._leave_at_s
+        over = self._answered or left or now_s >= self._leave_at_s
         if not over and now_s >= self._again_s:
             self._again_s = now_s + AGAIN_S
             self._run.sender.send(SetMode(RoverMode.HOLD), now_s)
@@ -74,6 +75,29 @@ class Shutdown:
                 self._run.vehicle = fold(self._run.vehicle, event)
             self._autopilot.service(now_s)
         return now_s
+
+    def parting(self, now_s: float) -> Reason[Parting] | None:
+        """How the rover is left; None where it is disarmed, or was never heard."""
+        vehicle = self._run.vehicle
+        if vehicle.heartbeat is None:
+            return None
+        if self._is_silent(now_s):
+            return Reason(Parting.SILENT)
+        if not vehicle.heartbeat.armed:
+            return None
+        if self.stopped_ours and vehicle.is_ours:
+            return Reason(Parting.ARMED, (RoverMode.HOLD.name,)) if self._answered else Reason(Parting.NOT_HELD)
+        return Reason(Parting.ARMED, (mode_name(vehicle),))
+
+    @property
+    def _answered(self) -> bool:
+        """Whether the autopilot has taken the HOLD of this end."""
+        ack = self._autopilot.last_ack(SetMode(RoverMode.HOLD))
+        return ack is not None and ack.result == 0 and ack.time_s > self._leave_at_s - CONFIRM_S
+
+    def _is_silent(self, now_s: float) -> bool:
+        heartbeat = self._run.vehicle.heartbeat
+        return heartbeat is not None and now_s - heartbeat.time_s > self._settings.current.safety.heartbeat_s
 
     def _is_ours(self, now_s: float) -> bool:
         """A rover that this run has not driven may be another companion's."""

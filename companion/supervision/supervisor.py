@@ -14,7 +14,7 @@ from companion.executive.mission_run import MissionRun, Order
 from companion.operator.notifications import Notifier, Outcome
 from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import Reaction, Verdict
-from companion.safety.reasons import EndReason, Reason
+from companion.safety.reasons import EndReason, Parting, Reason
 from companion.safety.watchdogs import Monitor
 from companion.supervision.arming import Arming
 from companion.supervision.drive_permission import DrivePermission
@@ -99,6 +99,10 @@ class Supervisor:
         now_s = self._shutdown.wait(clock, now_s)
         self.done = True
         self._saver.save(now_s, done=True)
+
+    def parting(self, now_s: float) -> Reason[Parting] | None:
+        """How the rover is left when the run ends."""
+        return self._shutdown.parting(now_s)
 
     def _mission_verdict(self, now_s: float) -> Verdict:
         self._limits.heed_fence()

@@ -36,6 +36,7 @@ from companion.safety.mode_latch import Control
 from companion.safety.reasons import Activity, EndReason, LatchReason, Reason, RunPhase, WaitReason
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.events import RoverMode
+from companion.vehicle.mode_names import mode_name
 from companion.vehicle.state import VehicleState
 from companion.viewer.even_rays import even_rays
 from companion.viewer.headway import Headway, Hindrance
@@ -82,19 +83,6 @@ DRIVES = {
     RoverMode.GUIDED: "ground station",
 }
 """Who drives where the companion does not; in a mode that is not named here it is the pilot."""
-MODE_NAMES = {
-    1: "ACRO",
-    3: "STEERING",
-    5: "LOITER",
-    6: "FOLLOW",
-    7: "SIMPLE",
-    8: "DOCK",
-    9: "CIRCLE",
-    12: "SMART_RTL",
-    16: "INITIALISING",
-}
-"""ArduRover's other modes."""
-
 Json = dict[str, Any]
 
 
@@ -284,18 +272,19 @@ def _driven_by(companion: Companion) -> str:
 
 
 def ending_of(companion: Companion, reason: Reason[Enum]) -> tuple[str, str]:
-    """How it ended; where not every target was reached, which were not."""
+    """How it ended; which targets were not reached, and how the rover is left where a person must know."""
     line = str(reason) if reason.kind in PLAIN_ENDS else f"ended, {reason}"
     statuses = companion.statuses()
     missed = [f"{name}: {NOT_REACHED.get(status, status)}" for name, status in statuses if status != REACHED]
+    left = [] if companion.parting is None else [str(companion.parting)]
     if not missed:
-        return line, ""
+        return line, SEPARATOR.join(left)
     more = f", and {len(missed) - MOST_MISSED} more" if len(missed) > MOST_MISSED else ""
     early = companion.outcome.broken_off
     if reason.kind is EndReason.DONE:
         line = "ended" if early is None else f"ended early, {early}"
     reached = f"{len(statuses) - len(missed)} of {len(statuses)} targets reached"
-    return f"{line}: {reached}", ", ".join(missed[:MOST_MISSED]) + more
+    return f"{line}: {reached}", SEPARATOR.join([", ".join(missed[:MOST_MISSED]) + more, *left])
 
 
 def mode_of(vehicle: VehicleState, run: MissionRun) -> Json:
@@ -308,16 +297,6 @@ def mode_of(vehicle: VehicleState, run: MissionRun) -> Json:
     if vehicle.is_ours:  # in doubt it has given the rover up, and asked for HOLD
         drives = "companion" if run.latch.control is Control.COMPANION else "nobody"
     return {"mode": mode_name(vehicle), "armed": heartbeat.armed, "drives": drives if heartbeat.armed else "nobody"}
-
-
-def mode_name(vehicle: VehicleState) -> str | None:
-    """The flight mode by its name, or its number where it has none here; None before the first heartbeat."""
-    if vehicle.heartbeat is None:
-        return None
-    mode = vehicle.heartbeat.mode
-    if mode in RoverMode.__members__.values():
-        return RoverMode(mode).name
-    return MODE_NAMES.get(mode, f"mode {mode}")
 
 
 def _path(executor: MissionExecutor | None) -> list[list[float]]:

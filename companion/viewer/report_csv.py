@@ -19,8 +19,8 @@ from companion.planning.problem import Path as FieldPath
 from companion.recording.record_clock import RecordClock
 from companion.replay.replay import ReplayObserver
 from companion.vehicle.commands import ChangeSpeed, GuidedHeading, GuidedPosition, GuidedVelocity
+from companion.vehicle.mode_names import mode_name
 from companion.vehicle.state import VehicleState
-from companion.viewer.frame import mode_name
 
 TIME = ("time_s", "time_utc")
 PLACE = ("north_m", "east_m", "latitude_deg", "longitude_deg")

@@ -20,9 +20,10 @@ from companion.mapping.evidence_map import EvidenceMap
 from companion.navigation.field_step import Decision
 from companion.recording.record_clock import RecordClock
 from companion.replay.replay import ReplayObserver
+from companion.vehicle.mode_names import mode_name
 from companion.viewer import foxglove
 from companion.viewer.foxglove_schemas import SCHEMAS
-from companion.viewer.frame import mode_name, news_of
+from companion.viewer.frame import news_of
 from companion.viewer.map_colours import CELL_COLOURS
 from companion.viewer.map_tiles import cell_classes
 from companion.viewer.tile_kernels import FREE, SEEN_OBSTACLE

@@ -90,7 +90,8 @@ def experiment(
         ),
     ] = "",
     missions: Annotated[
-        str, typer.Option(help="missions: names of shipped missions, separated by commas; default: all.")
+        str,
+        typer.Option(help="dead-companion, missions: names of shipped missions, separated by commas; default: all."),
     ] = "",
     guard: Annotated[
         bool,
@@ -178,7 +179,7 @@ def _refuse_unused_motion(name: str, options: Options) -> None:
         ("--off", options.off != OFF_MODEL, WITH_MISMATCH),
         ("--late", options.late_s > 0.0, WITH_LATE),
         ("--keep", options.keep is not None, DRIVES),
-        ("--missions", bool(options.missions), ("missions",)),
+        ("--missions", bool(options.missions), ("dead-companion", "missions")),
     ):
         if is_given and name not in takers:
             listed = " and ".join(filter(None, (", ".join(takers[:-1]), takers[-1])))

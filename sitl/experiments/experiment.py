@@ -74,7 +74,7 @@ class Options:
     keep: Path | None = None
     """The folder in which the results of single runs are kept; None: nowhere."""
     missions: tuple[str, ...] = ()
-    """``missions``: which of those that ship with the project; none: all."""
+    """Which of those that ship with the project; none: all."""
 
     def command(self, name: str) -> str:
         """What writes this experiment's part of the results page again."""

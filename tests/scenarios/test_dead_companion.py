@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from companion.mission.load import load_mission
-from sitl.experiments.dead_companion import DeadReport, Death, die, overheard, with_suite
+from companion.mission.mission import Mission
+from sitl.experiments import dead_companion
+from sitl.experiments.dead_companion import DeadReport, Death, die, overheard, run, with_suite
 from sitl.experiments.experiment import Options
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
@@ -51,3 +53,16 @@ def test_the_table_counts_what_it_says() -> None:
     (table,) = report.tables()
     assert [list(column.cells)[-1] for column in table.columns] == ["all", "", "2", "1", "2", "2", "1.0", "3.0", "5.0"]
     assert report.as_json()["deaths"] == [{name: getattr(death, name) for name in Death.__slots__} for death in deaths]
+
+
+def test_chosen_missions_die_as_they_do_among_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    def one(mission: Mission, controller: str, guarded: bool, off: float, seed: int, count: int) -> list[Death]:
+        suite = "" if mission.sitl is None else str(mission.sitl.sensors)
+        return [Death(str(mission.source), suite, controller, seed, 0.0, 0.0, 0, 0, 0.0, float(count))]
+
+    monkeypatch.setattr(dead_companion, "deaths_of", one)
+    maps = MISSIONS / "maps"
+    everything = run(Options(runs=60, maps=maps), lambda done, of: None).deaths
+    chosen = run(Options(runs=60, maps=maps, missions=("field.plan", "depot")), lambda done, of: None).deaths
+    assert chosen == tuple(one for one in everything if one.mission.endswith(("field.plan", "depot.toml")))
+    assert len(everything) == 12 * 3 * 2 == len({death.seed for death in everything}) and len(chosen) == 2 * 3 * 2

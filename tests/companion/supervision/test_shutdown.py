@@ -10,10 +10,11 @@ import pytest
 from companion.control.controller import STOP
 from companion.core.severity import Severity
 from companion.safety.mode_latch import Control, LatchState
-from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
+from companion.safety.reasons import Activity, EndReason, Parting, Reason, RunPhase
 from companion.supervision.shutdown import AGAIN_S, CONFIRM_S, Shutdown
 from companion.vehicle.commands import SetMode
 from companion.vehicle.events import AckSeen, HeartbeatSeen, RoverMode
+from companion.vehicle.state import fold
 from tests.companion.safety.test_mode_latch import HOLD
 from tests.support.desk import Desk
 
@@ -82,3 +83,41 @@ def test_after_an_error_it_listens_until_it_is_over(desk: Desk) -> None:
     desk.autopilot.events = [HeartbeatSeen(10.05, HOLD, True, 1)]
     assert shutdown.wait(desk.clock, 10.0) == pytest.approx(10.05)
     assert desk.autopilot.served == 1 and desk.clock.time_s == pytest.approx(10.05)
+
+
+ARMED_IN_HOLD = Reason(Parting.ARMED, ("HOLD",))
+
+
+@pytest.mark.parametrize(
+    ("what", "left"),
+    [
+        ("answered", ARMED_IN_HOLD),
+        ("in hold", ARMED_IN_HOLD),
+        ("not answered", Reason(Parting.NOT_HELD)),
+        ("taken over", Reason(Parting.ARMED, ("MANUAL",))),
+        ("disarmed", None),
+        ("silent", Reason(Parting.SILENT)),
+    ],
+)
+def test_it_says_how_the_rover_is_left(desk: Desk, what: str, left: Reason[Parting] | None) -> None:
+    shutdown = ending(desk)
+    shutdown.begin(DONE, 10.0)
+    end_s = 10.0 + CONFIRM_S
+    desk.run.vehicle = fold(desk.run.vehicle, HeartbeatSeen(10.1, RoverMode.GUIDED, True, 1))
+    match what:
+        case "answered":
+            desk.autopilot.ack = AckSeen(10.2, 176, 0)
+        case "silent":
+            end_s += desk.settings.current.safety.heartbeat_s
+        case "in hold" | "taken over" | "disarmed":
+            mode = RoverMode.MANUAL if what == "taken over" else RoverMode.HOLD
+            desk.run.vehicle = fold(desk.run.vehicle, HeartbeatSeen(10.3, mode, what != "disarmed", 1))
+    assert shutdown.parting(end_s) == left
+
+
+def test_it_does_not_say_hold_of_an_autopilot_that_is_silent(desk: Desk) -> None:
+    silent_s = desk.settings.current.safety.heartbeat_s + 10.0
+    desk.run.vehicle = fold(desk.run.vehicle, HeartbeatSeen(9.0, RoverMode.GUIDED, True, 1))
+    ending(desk).begin(Reason(EndReason.STOPPED_BY_USER), silent_s)
+    expected = "Companion: stopped by the user, HOLD asked for, but the autopilot is silent"
+    assert desk.notices.told == [(expected, Severity.WARNING)]

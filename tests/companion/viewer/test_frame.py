@@ -18,9 +18,20 @@ from companion.executive.mission_progress import TargetStatus
 from companion.mission.bounds import Bound
 from companion.navigation.field_step import Action
 from companion.safety.mode_latch import Control
-from companion.safety.reasons import Activity, Doubt, EndReason, LatchReason, PowerReason, Reason, RunPhase, WaitReason
+from companion.safety.reasons import (
+    Activity,
+    Doubt,
+    EndReason,
+    LatchReason,
+    Parting,
+    PowerReason,
+    Reason,
+    RunPhase,
+    WaitReason,
+)
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.events import RoverMode
+from companion.vehicle.mode_names import mode_name
 from companion.viewer.frame import (
     MAKES_WAY,
     MOST_PATH,
@@ -32,7 +43,6 @@ from companion.viewer.frame import (
     _setpoint,
     _thinned,
     doing_of,
-    mode_name,
     mode_of,
     told,
 )
@@ -92,6 +102,7 @@ DONE, BY_USER, NOBODY = (
     for kind in (EndReason.DONE, EndReason.STOPPED_BY_USER, EndReason.NOBODY_HERE)
 )
 LOW = Reason(PowerReason.LOW, ("battery",))
+STILL_ARMED = Reason(Parting.ARMED, ("HOLD",))
 ROLLS, PILOT = {"forward_m_s": 1.0}, {"mode": RoverMode.MANUAL}
 RESTARTED = {"restarted": True, "armed": False}
 TAKEN = {"taken_over": True}
@@ -123,6 +134,13 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         (DOUBTED, {}, "stopped: position wanders", ""),
         (DOUBTED, ROLLS, "stopping: position wanders", ""),
         (DONE, {}, "done", ""),
+        (DONE, {"parting": STILL_ARMED}, "done", "the rover is still armed, in HOLD"),
+        (
+            BY_USER,
+            {"shed": TargetStatus.PENDING, "parting": STILL_ARMED},
+            "stopped by the user: 1 of 2 targets reached",
+            "shed: not reached; the rover is still armed, in HOLD",
+        ),
         (DONE, SHED, "ended: 1 of 2 targets reached", "shed: unreachable"),
         (
             DONE,
@@ -149,7 +167,8 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
     statuses = [("gate", TargetStatus.REACHED), *((name, given[name]) for name in ("shed",) if name in given)]
     companion = SimpleNamespace(
         outcome=SimpleNamespace(broken_off=given.get("broken_off")), mission_run=run, vehicle=vehicle,
-        statuses=lambda: statuses, executor=SimpleNamespace(driver=SimpleNamespace(makes_way=given.get("makes_way"))),
+        statuses=lambda: statuses, parting=given.get("parting"),
+        executor=SimpleNamespace(driver=SimpleNamespace(makes_way=given.get("makes_way"))),
     )  # fmt: skip
     decision = SimpleNamespace(action=given.get("action", Action.FOLLOW))
     status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=decision)
