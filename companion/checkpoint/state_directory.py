@@ -12,7 +12,7 @@ from companion.checkpoint.state_format import MAX_FILE_BYTES, DamagedStateError,
 from companion.control.model_estimate import ModelEstimate
 from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
-from companion.storage.files import NEW_SUFFIX, OsDisk, open_file, set_aside
+from companion.storage.files import NEW_SUFFIX, open_file, set_aside
 
 NAME = "mission.state"
 LOCK = "lock"
@@ -99,20 +99,10 @@ class StateDirectory:
             )
         return run
 
-    def set_aside(self) -> Path | None:
-        """Rename a state that is there, because the mission begins at its first target. Returns the new name.
-
-        Raises StateDirectoryError.
-        """
-        try:
-            before = self.file.with_name(NAME + ".before")
-            self.file.replace(before)
-            OsDisk().sync_directory(self.directory)
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            raise StateDirectoryError(f"{self.file}: cannot be renamed: {error.strerror or error}; remove it") from None
-        return before
+    @property
+    def before(self) -> Path:
+        """Where an older state is kept when a mission begins at its first target."""
+        return self.file.with_name(NAME + ".before")
 
     def close(self) -> None:
         """Release the lock."""

@@ -5,6 +5,7 @@ Nouns: state file.
 
 from __future__ import annotations
 
+import contextlib
 from functools import partial
 from pathlib import Path
 
@@ -17,11 +18,16 @@ from companion.storage.files import Disk, replace_file
 
 
 class StateFile:
-    """The file, and the rows of the map given so far. Every write is tried: a full disk may have room again."""
+    """The file, and the rows of the map given so far. Every write is tried: a full disk may have room again.
 
-    def __init__(self, path: Path, disk: Disk) -> None:
+    ``before``: what an older state is renamed to when the first rows come, as the rover then drives a mission from its
+    beginning; None where that state is resumed.
+    """
+
+    def __init__(self, path: Path, disk: Disk, before: Path | None = None) -> None:
         self.path = path
         self.problem = ""
+        self._before = before
         self._disk = disk
         self._bands: dict[RowBand, bytes] = {}
         self._written = b""
@@ -31,8 +37,14 @@ class StateFile:
         """See StateWriter. The file that was written last, as far as is known."""
         return self._commands == progress.commands
 
+    @property
+    def is_saved(self) -> bool:
+        """Whether this run has written the file."""
+        return self._written != b""
+
     def apply(self, update: StateUpdate) -> None:
         """Keep the rows. If there is a snapshot, write the file unless its content is unchanged."""
+        self._set_aside()
         if update.new_map:
             self._bands.clear()
         for band, rows in update.rows.items():
@@ -49,6 +61,14 @@ class StateFile:
             self.problem = f"{self.path}: the state cannot be saved: {error.strerror or error}"
         except ValueError as error:  # a value outside the limits of SavedState
             self.problem = f"{self.path}: the state cannot be saved: {str(error).splitlines()[0]}"
+
+    def _set_aside(self) -> None:
+        """If that cannot be done, writing the file cannot either, and that is told."""
+        before, self._before = self._before, None
+        if before is not None:
+            with contextlib.suppress(OSError):
+                self._disk.rename(self.path, before)
+                self._disk.sync_directory(self.path.parent)
 
 
 class ThreadStateWriter:

@@ -89,6 +89,7 @@ class RunState:
         self._named = directory is not None
         self._say = say
         self._place: StateDirectory | None = None
+        self._written: StateFile | None = None
         try:
             self._place = StateDirectory(directory or default_directory(os.environ))
             self._load(say)
@@ -115,8 +116,10 @@ class RunState:
 
     @property
     def way_on(self) -> str:
-        """How to go on with a run that was stopped; empty if its state is not kept."""
-        if self.checkpointer is None or self.checkpointer.problem:
+        """How to go on with a run that was stopped; empty if there is nothing to go on with."""
+        if self.checkpointer is None or self.checkpointer.problem or self._written is None:
+            return ""
+        if self.previous is None and not self._written.is_saved:
             return ""
         return "to go on where it was stopped: the same command with --resume"
 
@@ -129,18 +132,14 @@ class RunState:
         return list(zip(names, self.previous.state.progress.statuses, strict=True))
 
     def start(self, budget: ShutdownBudget | None = None) -> None:
-        """Start writing the state, when all else that a run needs is there. Without --resume an old one is set aside.
+        """Start writing the state, when all else that a run needs is there.
 
-        Raises StateDirectoryError like the constructor.
+        Without --resume an old state is set aside, but not before the mission begins.
         """
-        try:
-            if self._place is not None and not self._resume:
-                self._place.set_aside()
-        except StateDirectoryError as error:
-            self._do_without(error)
         if self._place is not None:
-            writer = ThreadStateWriter(StateFile(self._place.file, OsDisk()), budget)
-            self.checkpointer = Checkpointer(self._mission, writer, self.previous)
+            before = None if self._resume else self._place.before
+            self._written = StateFile(self._place.file, OsDisk(), before)
+            self.checkpointer = Checkpointer(self._mission, ThreadStateWriter(self._written, budget), self.previous)
 
     def close(self) -> None:
         """Write what is left."""

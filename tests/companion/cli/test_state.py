@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from companion.checkpoint.checkpointer import Checkpointer
+from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
 from companion.checkpoint.state_directory import StateDirectoryError
-from companion.checkpoint.state_format import SavedProgress
+from companion.checkpoint.state_format import RowBand, SavedProgress
+from companion.checkpoint.state_writer import StateFile
 from companion.cli.inputs import OutputError
 from companion.cli.state import RunState, StateFiles
+from companion.storage.files import OsDisk
 from tests.support.rig import yard
 from tests.support.states import a_state, leave_state
 
@@ -20,7 +23,9 @@ def test_a_state_that_is_older_than_the_run_is_told_with_the_remedy(
 ) -> None:
     with_state = RunState(yard(tmp_path), tmp_path / "state", resume=False, say=lambda _: None)
     with_state.start()
-    assert with_state.problem == "" and with_state.way_on.endswith("the same command with --resume")
+    assert (with_state.problem, with_state.way_on) == ("", ""), "nothing is saved yet"
+    monkeypatch.setattr(StateFile, "is_saved", True)
+    assert with_state.way_on.endswith("the same command with --resume")
     monkeypatch.setattr(Checkpointer, "problem", "mission.state: the state cannot be saved: No space left on device")
     assert with_state.way_on == ""
     assert with_state.problem.endswith("; make room there or name another place with --state DIR")
@@ -47,15 +52,33 @@ def test_a_place_that_cannot_be_used_is_refused_only_where_it_was_asked_for(
     assert keeping.checkpointer is None and len(said) == 1 and said[0].endswith("this run cannot be resumed")
 
 
-def test_without_resume_a_mission_begins_anew_and_the_state_before_is_kept(tmp_path: Path) -> None:
+def test_a_run_that_never_began_leaves_the_older_state_alone(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     leave_state(tmp_path, mission).close()
     keeping = RunState(mission, tmp_path / "state", resume=False, say=print)
-    assert keeping.previous is None
-    assert (tmp_path / "state" / "mission.state").exists(), "the run may still fail to begin: no link, no record"
     keeping.start()
     keeping.close()
-    assert sorted(path.name for path in (tmp_path / "state").iterdir()) == ["lock", "mission.state.before"]
+    assert keeping.previous is None and keeping.way_on == ""
+    assert sorted(path.name for path in (tmp_path / "state").iterdir()) == ["lock", "mission.state"]
+
+
+def test_what_is_resumed_can_be_resumed_again(tmp_path: Path) -> None:
+    mission = yard(tmp_path)
+    leave_state(tmp_path, mission).close()
+    keeping = RunState(mission, tmp_path / "state", resume=True, say=print)
+    keeping.start()
+    keeping.close()
+    assert keeping.way_on.endswith("the same command with --resume")
+
+
+def test_a_state_file_keeps_the_older_state_when_the_first_rows_come(tmp_path: Path) -> None:
+    path, before = tmp_path / "mission.state", tmp_path / "mission.state.before"
+    path.write_bytes(b"older")
+    file = StateFile(path, OsDisk(), before)
+    assert path.exists() and not file.is_saved
+    for _ in range(2):
+        file.apply(StateUpdate({RowBand("log_odds", 0, 1): np.zeros((1, 4), dtype=np.float32)}))
+    assert not path.exists() and before.read_bytes() == b"older"
 
 
 def test_a_mission_that_has_ended_is_told_and_not_driven_again(tmp_path: Path) -> None:
