@@ -32,8 +32,8 @@ def replay(
         str | None,
         typer.Option(
             metavar="MOMENT",
-            help="Show why a decision was made: its number (66), or the one in force so many seconds after the start "
-            "(83.5s) or at a time of day (14:03:22).",
+            help="Show why a decision was made: its number (66), or the one in force so long after the start "
+            "(83.5s or 1:23) or at a time of day (14:03:22).",
         ),
     ] = None,
     show_list: Annotated[

@@ -16,7 +16,7 @@ from companion.storage.files import open_file, read_at_most
 
 SIMULATED_UNTIL_US = 1_600_000_000_000_000
 """September 2020: simulated time begins with that year."""
-DAY_S = 86_400.0
+DAY_S, DAY_US = 86_400.0, 86_400_000_000
 SHOWN_S = 0.006
 """Times are shown to a hundredth: one that was read off a list means the moment that was listed."""
 SECONDS = re.compile(r"(\d{1,9}(?:\.\d{1,9})?) ?s|(\d{1,9}\.\d{1,9})", re.ASCII)
@@ -58,21 +58,30 @@ class RecordClock:
 
     def time_of_day(self, since_s: float) -> str:
         """Hours, minutes and seconds with hundredths; a simulated day has nothing before its first packet."""
-        return str(np.datetime_as_string(np.datetime64(max(self.unix_us(since_s), 0) + 5000, "us"), unit="ms"))[11:22]
+        us = self.unix_us(since_s)
+        if self.simulated:
+            us = max(us, round(self.began_us / DAY_US) * DAY_US)
+        return str(np.datetime_as_string(np.datetime64(us + 5000, "us"), unit="ms"))[11:22]
 
     def moment_s(self, text: str) -> float | None:
         """Seconds since the start, of a text like ``83.5s`` or ``14:03:22``; None for any other text.
 
-        A time of day is the first one in the record; it may lie behind its end.
+        A time of day is the first one in the record; it may lie behind its end. ``1:30`` is a minute and a half after
+        the start where the record has no such time of day.
         """
         if found := SECONDS.fullmatch(text):
             return float(found[1] or found[2])
         found = OF_DAY.fullmatch(text)
         hour, minute, second_s = (0, 0, 0.0) if found is None else (int(found[1]), int(found[2]), float(found[3] or 0))
-        if found is None or hour > 23 or minute > 59 or second_s >= 60.0:
+        if found is None or minute > 59 or second_s >= 60.0:
             return None
+        after_s = 60.0 * hour + minute
+        is_after = found[3] is None and self.holds(after_s)
+        if hour > 23:
+            return after_s if is_after else None
         of_day_s = 3600.0 * hour + 60.0 * minute + second_s
-        return (of_day_s - 1e-6 * self.began_us + SHOWN_S) % DAY_S - SHOWN_S
+        since_s = (of_day_s - 1e-6 * self.began_us + SHOWN_S) % DAY_S - SHOWN_S
+        return after_s if is_after and not self.holds(since_s) else since_s
 
     def holds(self, since_s: float) -> bool:
         """Whether the record had not ended by then."""

@@ -86,7 +86,8 @@ def list_lines(listed: Iterable[Listed], clock: RecordClock) -> list[str]:
 def decision_at(record: Record, clock: RecordClock, text: str) -> int:
     """The number of the decision that a person asks for: by its number, or the one in force at a moment.
 
-    A moment is seconds since the start (``83.5s``) or a time of day (``14:03:22``). Raises RecordError.
+    A moment is seconds since the start (``83.5s``), minutes and seconds (``1:23``) or a time of day (``14:03:22``).
+    Raises RecordError.
     """
     last = len(record.decisions)
     if text.isascii() and text.isdigit() and len(text) < 10:
@@ -96,8 +97,8 @@ def decision_at(record: Record, clock: RecordClock, text: str) -> int:
     since_s = clock.moment_s(text)
     if since_s is None:
         raise RecordError(
-            f"--why {text!r:.40}: give the number of a decision (66), seconds since the start (83.5s) or a time of day "
-            "(14:03:22); --list shows all decisions"
+            f"--why {text!r:.40}: give the number of a decision (66), the time since the start (83.5s or 1:23) or a "
+            "time of day (14:03:22); --list shows all decisions"
         )
     if not clock.holds(since_s):
         raise RecordError(

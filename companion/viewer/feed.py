@@ -128,7 +128,7 @@ class ViewerFeed:
     def _frame(self, status: Status) -> Json:
         executor = self._companion.executor
         self.steady.note(None if executor is None else executor.layout.origin)
-        frame = self.steady.frame(frame_of(self._companion, status, self._headway.line))
+        frame = self.steady.frame(frame_of(self._companion, status, self._headway))
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
         frame["contacts"] = None if self.touched is None else len(self.touched)
         frame["touched"] = list((self.touched or ())[-TOUCHED_KEPT:])

@@ -107,11 +107,8 @@ def scene_of(mission: Mission, run: MissionRun, epoch: int) -> Json:
     }
 
 
-def frame_of(companion: Companion, status: Status, held_up: str = "") -> Json:
-    """The moment. ``news`` are those of this tick alone.
-
-    ``held_up``: why a rover that is led does not get on.
-    """
+def frame_of(companion: Companion, status: Status, headway: Headway | None = None) -> Json:
+    """The moment. ``news`` are those of this tick alone."""
     run, executor = companion.mission_run, companion.executor
     vehicle, now_s, pose = run.vehicle, status.time_s, status.pose
     return {
@@ -121,8 +118,8 @@ def frame_of(companion: Companion, status: Status, held_up: str = "") -> Json:
         "speed": None if vehicle.position is None else round(vehicle.forward_m_s, 3),
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
         **mode_of(vehicle, run),
-        **doing_of(companion, status, held_up),
-        "held_up": held_up,
+        **doing_of(companion, status, headway),
+        "held_up": "" if headway is None else headway.line,
         "statuses": [str(one) for _, one in run.statuses()],
         "goal": _goal(executor),
         "path": _path(executor),
@@ -213,11 +210,11 @@ def _map(executor: MissionExecutor) -> Json:
     }
 
 
-def doing_of(companion: Companion, status: Status, held_up: str = "") -> Json:
-    """One large line; then what is awaited where it says why the rover stands, or why it drives back."""
+def doing_of(companion: Companion, status: Status, headway: Headway | None = None) -> Json:
+    """One large line; then what is awaited where it says why the rover stands, or why it drives as it does."""
     activity, line, why = status.activity, status.doing, ""
     if activity.phase is RunPhase.DRIVING and status.target:
-        line, why = _driving(companion, status, held_up)
+        line, why = _driving(companion, status, headway)
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
         line, why = _stopped(companion, activity)
     elif activity.phase is RunPhase.WAITING:
@@ -233,16 +230,21 @@ def doing_of(companion: Companion, status: Status, held_up: str = "") -> Json:
     return {"line": line, "why": why, "state": state}
 
 
-def _driving(companion: Companion, status: Status, held_up: str) -> tuple[str, str]:
-    """Where to, that it goes back first, or why it does not get on; then why early, and that it makes way."""
+def _driving(companion: Companion, status: Status, headway: Headway | None) -> tuple[str, str]:
+    """Where to, that it goes back first, or why it does not get on.
+
+    Then why early, that it makes way, and why it has just taken another way.
+    """
     goes_back = status.decision is not None and status.decision.action is Action.BACKTRACK
     line = f"going back to find another way to {status.target}" if goes_back else f"driving to {status.target}"
     early = companion.outcome.broken_off
     why = [] if early is None else [str(early)]
-    if held_up:
-        return held_up, SEPARATOR.join(why)
+    if headway is not None and headway.line:
+        return headway.line, SEPARATOR.join(why)
     if companion.executor is not None and companion.executor.driver.makes_way:
         why.append(MAKES_WAY)
+    if headway is not None and headway.rerouted:
+        why.append(headway.rerouted)
     return line, SEPARATOR.join(why)
 
 

@@ -1,4 +1,6 @@
-"""Whether a rover that is led gets on, and if not, why: to the companion it is driving all the while.
+"""Whether a rover that is led gets on, and if not, why; and why it has just taken another way.
+
+To the companion it is driving all the while.
 
 Nouns: hindrance, headway.
 """
@@ -11,6 +13,7 @@ from enum import Enum
 
 from companion.app import Companion, Status
 from companion.core.frames import Pose
+from companion.navigation.field_step import Decision, DecisionReason
 from companion.safety.reasons import RunPhase
 
 CIRCLES = ((0.3, 6.0), (1.0, 12.0))
@@ -18,6 +21,15 @@ CIRCLES = ((0.3, 6.0), (1.0, 12.0))
 change of direction, takes less."""
 YIELDS = ((0.3, 3.0),)
 """The same for one that makes way: it does not turn meanwhile."""
+REROUTES = (
+    DecisionReason.PATH_BLOCKED,
+    DecisionReason.BETTER_PATH,
+    DecisionReason.FOUND_GOING_BACK,
+    DecisionReason.PAST_PATH_BLOCKED,
+)
+"""Decisions after which the rover turns off, so that people ask why."""
+REROUTED_S = 5.0
+"""So long the reason is told."""
 MADE_WAY_S = 2.0
 """Way that was made longer ago is not why the rover stands now."""
 
@@ -40,6 +52,10 @@ class Headway:
         """The same in words, with where it is to drive."""
         self.begins = False
         """Whether this tick is the first of it."""
+        self.rerouted = ""
+        """Why it has just taken another way, in words; empty where it has not."""
+        self._decision: Decision | None = None
+        self._rerouted_s = -math.inf
         self._centres: dict[float, Pose] = {}
         self._made_way_s = -math.inf
         self._stuck: int | None = None
@@ -51,6 +67,16 @@ class Headway:
         where = " to" if self.hindrance is Hindrance.STUCK else ", heading for"
         self.line = "" if self.hindrance is None else f"{self.hindrance.value}{where} {status.target}"
         self.begins = self.hindrance not in (None, before)
+        self._note_decision(status)
+
+    def _note_decision(self, status: Status) -> None:
+        """A decision stands until the rover enters the next field; its reason is told for longer."""
+        decision, before = status.decision, self._decision
+        self._decision = decision
+        if decision is not None and decision is not before and decision.reason in REROUTES:
+            self.rerouted, self._rerouted_s = str(decision.reason), status.time_s
+        elif status.time_s - self._rerouted_s > REROUTED_S:
+            self.rerouted = ""
 
     def _look(self, companion: Companion, status: Status) -> Hindrance | None:
         driver, pose = companion.driver, status.pose

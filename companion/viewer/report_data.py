@@ -177,7 +177,7 @@ class ReportWatch(ReplayObserver):
         self._steady.note(None if executor is None else executor.layout.origin)
         if self._start is None and status.pose is not None:
             self._start = status.pose.north_m, status.pose.east_m
-        frame = self._steady.frame(frame_of(companion, status, self._headway.line))
+        frame = self._steady.frame(frame_of(companion, status, self._headway))
         frame.update({"t": round(time_s, 2), "news": self._news})
         frame["rates"] = self._rates.at(companion.vehicle, status.time_s)
         frame = self._last_place.told(frame, companion.vehicle, status.time_s)

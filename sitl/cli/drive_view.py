@@ -53,7 +53,7 @@ class DriveView:
         self._take_in(status)
         now_s = stopwatch_s()
         if self._painter.is_due(now_s):
-            self._show(self._view(status, now_s, headline_of(self._run.companion, status, self._headway.line)))
+            self._show(self._view(status, now_s, headline_of(self._run.companion, status, self._headway)))
 
     def _take_in(self, status: Status) -> None:
         self._watching.note()

@@ -25,6 +25,7 @@ from sitl.autopilot.vehicle import Vehicle
 from sitl.plant.outline import Outline
 from sitl.simulator import Simulator
 from sitl.view.activity import activity_of
+from sitl.view.gps_fix import NO_GPS, fix_told
 from sitl.view.true_rays import rays_of
 from sitl.view.watching import bounds_of
 from sitl.world import geodesy
@@ -41,7 +42,7 @@ DRIVES = {
     Mode.GUIDED: "companion or ground station",
 }
 """Who drives in these modes; in all others it is the autopilot."""
-FIXES, SATELLITES = {1: "no fix", 3: "3D", 4: "3D DGPS", 5: "RTK float", 6: "RTK fixed"}, 10
+SATELLITES = 10
 """As GPS_RAW_INT says it."""
 
 Json = dict[str, Any]
@@ -206,6 +207,5 @@ def _battery(vehicle: Vehicle) -> Json | None:
 
 
 def _gps(vehicle: Vehicle) -> Json:
-    if vehicle.has_home and vehicle.ekf.gps_has_fix:
-        return {"fix": FIXES[vehicle.ekf.gps.fix_type], "satellites": SATELLITES}
-    return {"fix": "no GPS", "satellites": None}
+    fix = fix_told(vehicle)
+    return {"fix": fix, "satellites": None if fix == NO_GPS else SATELLITES}

@@ -16,6 +16,7 @@ from companion.viewer.terminal.screen import View
 from companion.viewer.terminal.sketch import Disc, Kind, Layer, Place, PlaceState, Sketch, compass_word
 from sitl.autopilot.control.records import LEG, WAYPOINT
 from sitl.simulator import Simulator
+from sitl.view.gps_fix import NO_GPS, fix_told
 from sitl.world.world import World
 
 TRACK_STEP_M = 0.2
@@ -188,10 +189,10 @@ def _collisions(simulator: Simulator) -> str:
 def _health(simulator: Simulator) -> tuple[Fact, ...]:
     """GPS, EKF, and the battery if it is monitored."""
     vehicle = simulator.vehicle
-    fix = vehicle.has_home and vehicle.ekf.gps_has_fix
+    fix = fix_told(vehicle)
     position = "position known" if vehicle.has_position else "no position"
     facts = [
-        Fact("GPS", "3D fix" if fix else "no fix", alarm=not fix, minor=True),
+        Fact("GPS", fix, alarm=fix == NO_GPS, minor=True),
         Fact("EKF", position, alarm=not vehicle.has_position, minor=True),
     ]
     if int(vehicle.parameters["BATT_MONITOR"]) != 0:

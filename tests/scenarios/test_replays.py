@@ -313,7 +313,10 @@ def test_why_takes_a_moment_of_the_list_and_shows_the_decision_in_force(
     ("options", "says"),
     [
         (["--why", "0"], "there is no decision 0, the last one is"),
-        (["--why", "14:99"], "give the number of a decision (66), seconds since the start (83.5s) or a time of day"),
+        (
+            ["--why", "14:99"],
+            "give the number of a decision (66), the time since the start (83.5s or 1:23) or a time of day",
+        ),
         (["--why", "9999s"], "it lasts"),
         (["--why", "23:00:00"], "--list shows all decisions"),
         (["--why", "1s"], "no decision had been made at 1s: the first was made after"),

@@ -29,6 +29,7 @@ from companion.safety.reasons import EndReason
 from companion.viewer import frame, map_tiles, report_data, report_mcap
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
 from companion.viewer.frame import doing_of
+from companion.viewer.headway import Headway
 from companion.viewer.report_csv import FILES
 from companion.viewer.report_data import ReportWatch, as_json, counted, joined, run_of
 from companion.viewer.report_page import report_page
@@ -453,8 +454,8 @@ def test_a_report_reaches_the_last_moment_of_a_drive_that_was_broken_off_and_say
 ) -> None:
     """Also a stop is seen that was shorter than the time between two frames."""
 
-    def doing(companion: Companion, status: Status, held_up: str = "") -> dict[str, Any]:
-        told = doing_of(companion, status, held_up)
+    def doing(companion: Companion, status: Status, headway: Headway | None = None) -> dict[str, Any]:
+        told = doing_of(companion, status, headway)
         return {**told, "state": "stopped"} if abs(status.time_s - 50.15) < 0.01 else told
 
     for module in (report_data, frame):

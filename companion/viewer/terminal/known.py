@@ -20,6 +20,7 @@ from companion.mapping.evidence_map import EvidenceMap
 from companion.navigation.field_step import Part
 from companion.safety.reasons import RunPhase
 from companion.viewer.frame import doing_of
+from companion.viewer.headway import Headway
 from companion.viewer.terminal.facts import Fact, Section
 from companion.viewer.terminal.screen import Headline, Mood
 from companion.viewer.terminal.sketch import Kind, Layer, Place, PlaceState
@@ -72,9 +73,9 @@ def path_ahead(companion: Companion, north_m: float = 0.0, east_m: float = 0.0) 
     return np.empty((0, 2)) if path is None else path.points[path.progress :, :2] + (north_m, east_m)
 
 
-def headline_of(companion: Companion, status: Status, held_up: str = "") -> Headline:
+def headline_of(companion: Companion, status: Status, headway: Headway | None = None) -> Headline:
     """In one line what is done, or why the rover stands and what it waits for; in the end, what it came to."""
-    doing = doing_of(companion, status, held_up)
+    doing = doing_of(companion, status, headway)
     left = _left_m(companion, status) if status.activity.phase is RunPhase.DRIVING else None
     far = "" if left is None else f", {left:.0f} m straight"
     why = f", {doing['why']}" if doing["why"] else ""

@@ -51,6 +51,14 @@ def test_a_moment_is_seconds_or_a_time_of_day(text: str, since_s: float) -> None
     assert EVENING.moment_s(text) == pytest.approx(since_s)
 
 
+@pytest.mark.parametrize(("text", "since_s"), [("1:30", 90.0), ("00:01:30", 90.05), ("2:30", 9_000.05)])
+def test_minutes_and_seconds_are_since_the_start_where_no_such_time_of_day_came(text: str, since_s: float) -> None:
+    assert EVENING.moment_s("45:10") == pytest.approx(2710.0), "no hour of a day"
+    simulated = RecordClock(0.0, 1_577_836_799_950_000, 103.4)
+    assert simulated.moment_s(text) == pytest.approx(since_s)
+    assert simulated.time_of_day(0.0) == "00:00:00.00" and simulated.time_of_day(1.0) == "00:00:00.95"
+
+
 def test_a_time_of_day_that_never_came_is_not_in_the_record() -> None:
     late_s = EVENING.moment_s("23:39:59")
     assert late_s is not None and late_s > 86_000.0 and not EVENING.holds(late_s)

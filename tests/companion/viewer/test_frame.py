@@ -117,6 +117,7 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         (DRIVING, {"makes_way": True}, "driving to gate", "making way for something that moves"),
         (DRIVING, {"broken_off": LOW}, "driving to gate", "battery low for the autopilot"),
         (DRIVING, {"broken_off": LOW, "makes_way": True}, "driving to gate", f"{LOW}; {MAKES_WAY}"),
+        (DRIVING, {"rerouted": "a better path"}, "driving to gate", "a better path"),
         (DRIVING, {"broken_off": LOW, "held_up": "stuck"}, "stuck", "battery low for the autopilot"),
         (WAITING, {}, "waiting for arming", "asked for; the autopilot says if it refuses"),
         (HELD, {}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
@@ -172,7 +173,8 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
     )  # fmt: skip
     decision = SimpleNamespace(action=given.get("action", Action.FOLLOW))
     status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=decision)
-    doing = doing_of(cast(Any, companion), cast(Any, status), given.get("held_up", ""))
+    headway = SimpleNamespace(line=given.get("held_up", ""), rerouted=given.get("rerouted", ""))
+    doing = doing_of(cast(Any, companion), cast(Any, status), cast(Any, headway))
     assert (doing["line"], doing["why"]) == (line, why)
 
 

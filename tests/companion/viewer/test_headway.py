@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from companion.core.frames import Pose
+from companion.navigation.field_step import DecisionReason
 from companion.safety.reasons import Activity, RunPhase
 from companion.viewer.frame import news_of
 from companion.viewer.headway import Headway, Hindrance
@@ -33,7 +34,9 @@ def watched(
         given = {"decision": "follow", "makes_way": False, "stuck": 0, **driver_at(time_s)}
         driver = SimpleNamespace(**given, tally=SimpleNamespace(stuck=given["stuck"]))
         pose = Pose(north_m(time_s), 0.0, 0.0, time_s)
-        status = SimpleNamespace(time_s=time_s, pose=pose, activity=Activity(phase), target="gate", news=())
+        status = SimpleNamespace(
+            time_s=time_s, pose=pose, activity=Activity(phase), target="gate", news=(), decision=None
+        )
         headway.note(cast(Any, SimpleNamespace(driver=driver)), cast(Any, status))
         told += [one["text"] for one in news_of(cast(Any, status), headway)]
         if headway.hindrance is not changes[-1][1]:
@@ -64,3 +67,17 @@ def test_a_stuck_one_looks_for_another_way_until_there_is_one() -> None:
 
 def test_one_that_is_not_to_drive_is_not_held_up() -> None:
     assert watched(20.0, lambda _: 0.0, phase=RunPhase.WAY_BLOCKED) == []
+
+
+def test_why_it_took_another_way_is_told_for_some_seconds() -> None:
+    following, blocked = (
+        SimpleNamespace(reason=reason) for reason in (DecisionReason.FOLLOWING, DecisionReason.PATH_BLOCKED)
+    )
+    headway, told = Headway(), []
+    for tick in range(120):
+        time_s = tick * STEP_S
+        decision = blocked if 30 <= tick < 35 else following
+        status = SimpleNamespace(time_s=time_s, pose=None, activity=Activity(RunPhase.DRIVING), decision=decision)
+        headway.note(cast(Any, SimpleNamespace(driver=None)), cast(Any, status))
+        told.append(headway.rerouted)
+    assert told[29] == "" and set(told[30:80]) == {"current path blocked: new path"} and set(told[82:]) == {""}

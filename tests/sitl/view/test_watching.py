@@ -31,7 +31,7 @@ def test_the_simulator_as_it_is_seen() -> None:
     watching = Watching("Yard", simulator)
     simulator.advance_to_s(1.0)
     closed = "\n".join(screen(watching.view(0.0)))
-    for text in ("Yard: 30 x", "MANUAL, disarmed", "no fix", "90° E", "tcp:1.2.3.4:5", "door closed", "→", "o moving"):
+    for text in ("Yard: 30 x", "MANUAL, disarmed", "no GPS", "90° E", "tcp:1.2.3.4:5", "door closed", "→", "o moving"):
         assert text in closed
     simulator.advance_to_s(3.0)
     link.take()
