@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -23,9 +24,8 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place
 from companion.mission.outline_hint import outline_hint
 from companion.mission.resolve import ResolvedMission, resolve
-from companion.mission.world_shapes import touches_obstacle
+from companion.mission.simulated_world import SimulatedWorld, check_start, doubtful_targets, world_of
 from companion.settings import MappingSettings
-from companion.storage.toml_file import read_toml
 
 app = typer.Typer(name="mission", add_completion=False)
 
@@ -47,17 +47,32 @@ def check(
     try:
         mission = load_mission(mission_file, skip_unknown=skip_unknown)
         mission = with_given(mission, Given(resolution_m, radius_m, speed_m_s))
-        maps = _maps(mission)
-        _check_start(mission)
+        world = world_of(mission)
+        maps = _maps(mission, world)
+        if world is not None:
+            check_start(mission, world)
+        _check_start_known(mission)
         resolved = _try_resolve(mission)
     except (MissionError, MapError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     show(mission, maps, Console(highlight=False), resolved)
     warn_of_places(mission, lambda line: typer.echo(warning(line)))
+    for line in _doubtful_in(world, mission, resolved):
+        typer.echo(warning(line))
 
 
-def _check_start(mission: Mission) -> None:
+def warn_of_world(mission: Mission, warn: Callable[[str], None]) -> None:
+    """Say which targets lie outside the simulator's world, or in its walls. Raises MissionError and MapError."""
+    for line in _doubtful_in(world_of(mission), mission, _try_resolve(mission)):
+        warn(line)
+
+
+def _doubtful_in(world: SimulatedWorld | None, mission: Mission, resolved: ResolvedMission | None) -> list[str]:
+    return [] if world is None or resolved is None else doubtful_targets(mission, resolved, world)
+
+
+def _check_start_known(mission: Mission) -> None:
     """Raises MissionError unless it is known where the rover stands in the simulator's world."""
     sitl = mission.sitl
     if sitl is not None and sitl.world is not None and sitl.start is None and mission.grid.home is None:
@@ -175,51 +190,16 @@ def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
     return f"{size_of}), for gaps of {gap_m:.1f} m or more"
 
 
-def _maps(mission: Mission) -> list[str]:
+def _maps(mission: Mission, world: SimulatedWorld | None) -> list[str]:
     """Loads the maps that the mission names, to find a bad one before the drive; returns a line for each."""
     lines = []
-    sitl = mission.sitl
-    resolution_m = mission.grid.resolution_m
     if mission.prior_map is not None:
-        lines.append(f"known map: {mission.prior_map}: {_map_text(load_map(mission.prior_map, resolution_m))}")
-    if sitl is not None and sitl.world is not None and sitl.world.suffix.lower() == ".toml":
-        _check_world_file(mission, sitl.world, sitl.resolution_m or resolution_m)
-        lines.append(f"simulator's world: {sitl.world}: a world file; what it describes only rover-sitl checks")
-    elif sitl is not None and sitl.world is not None:
-        world = load_map(sitl.world, sitl.resolution_m or resolution_m)
-        _check_inside(mission, world.resolution_m, world.width * world.resolution_m, world.height * world.resolution_m)
-        if sitl.start is not None and world.is_obstacle(sitl.start):
-            raise _on_wall(mission, sitl.start, f"is an obstacle in {sitl.world}")
-        lines.append(f"simulator's world: {sitl.world}: {_map_text(world)}")
+        known = load_map(mission.prior_map, mission.grid.resolution_m)
+        lines.append(f"known map: {mission.prior_map}: {_map_text(known)}")
+    if world is not None:
+        unknown = "a world file; what it describes only rover-sitl checks"
+        lines.append(f"simulator's world: {world.path}: {unknown if world.grid is None else _map_text(world.grid)}")
     return lines
-
-
-def _check_world_file(mission: Mission, world: Path, field_m: float) -> None:
-    """Raises MissionError where ``sitl.start``, in fields of ``field_m``, lies outside this world or on a wall."""
-    content = read_toml(world, MissionError)
-    size_m, cell = content.get("size_m"), mission.sitl.start if mission.sitl is not None else None
-    if isinstance(size_m, list) and len(size_m) == len(("east", "north")):
-        _check_inside(mission, field_m, *map(float, size_m))
-    if cell is None:
-        return
-    place_m = ((cell.y + 0.5) * field_m, (cell.x + 0.5) * field_m)
-    if touches_obstacle(world, content, mission.rover.footprint, place_m):
-        raise _on_wall(mission, cell, f"touches an obstacle of {world}")
-
-
-def _on_wall(mission: Mission, cell: Cell, says: str) -> MissionError:
-    where = f"{mission.source or mission.name}: sitl.start: field {cell.x}, {cell.y}"
-    return MissionError(f"{where} {says}; choose a free field")
-
-
-def _check_inside(mission: Mission, field_m: float, east_m: float, north_m: float) -> None:
-    """Raises MissionError where ``sitl.start``, in fields of ``field_m``, lies outside a world of this size."""
-    cell = mission.sitl.start if mission.sitl is not None else None
-    if cell is None:
-        return
-    if not (0.0 <= (cell.x + 0.5) * field_m < east_m and 0.0 <= (cell.y + 0.5) * field_m < north_m):
-        says = f"field {cell.x}, {cell.y} lies outside the world ({east_m:g} m east, {north_m:g} m north)"
-        raise MissionError(f"{mission.source or mission.name}: sitl.start: {says}; fields are of {field_m:g} m here")
 
 
 def _map_text(grid: Grid) -> str:

@@ -14,6 +14,7 @@ from companion.app import Status
 from companion.cli.entry import StoppedError
 from companion.cli.given import RadiusM, SpeedMS
 from companion.cli.inputs import EXIT_BAD_INPUT, EXIT_NOT_WRITTEN, Laps, OutputError, SkipUnknown, usable_settings
+from companion.cli.mission import warn_of_world
 from companion.cli.source import warn_of_places, warning
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
@@ -227,6 +228,7 @@ def _simulated(mission: Mission, faults: Path | None, lidars: Sequence[LidarSpec
     refuse_turning_on_the_spot(mission, scenario)
     for note in scenario.notes:
         typer.echo(note, err=True)
+    warn_of_world(mission, lambda line: _warn(warning(line)))
     return scenario
 
 

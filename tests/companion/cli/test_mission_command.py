@@ -233,3 +233,26 @@ def test_mistakes_that_people_make_are_named(tmp_path: Path, text: str, says: st
         .replace("18,0", "18.0")
     )
     assert CliRunner().invoke(app, ["mission", "check", str(inside)]).exit_code == (2 if "size_m" in text else 0)
+
+
+@pytest.mark.parametrize("world", ["w.toml", "w.png"])
+def test_it_warns_of_targets_in_walls_and_outside_the_simulators_world(tmp_path: Path, world: str) -> None:
+    (tmp_path / "w.toml").write_text("size_m = [30, 20]\n[[obstacle]]\nline_m = [[4, 5.5], [7, 5.5]]\nwidth_m = 1.0\n")
+    picture = Image.new("L", (30, 20), 255)
+    picture.putpixel((5, 14), 0)
+    picture.save(tmp_path / "w.png")
+    places = {"free": (1, 1), "in the wall": (4, 4), "far": (1, 90), "south": (-2, 0), "behind it": (8, 4)}
+    targets = (
+        f'[[target]]\nname = "{name}"\nnorth_m = {north_m}\neast_m = {east_m}\n'
+        for name, (north_m, east_m) in places.items()
+    )
+    path = tmp_path / "m.toml"
+    path.write_text(f'{"".join(targets)}[sitl]\nworld = "{world}"\nstart = [1, 1]\n')
+    result = CliRunner().invoke(app, ["mission", "check", str(path)])
+    assert result.exit_code == 0, result.output
+    warned = [line.partition(" the simulator's world")[0] for line in result.output.splitlines() if "warning" in line]
+    assert warned == [
+        "warning: target 'in the wall' lies in an obstacle of",
+        "warning: target 'far' lies outside",
+        "warning: target 'south' lies outside",
+    ]
