@@ -147,6 +147,8 @@ class ReportWatch(ReplayObserver):
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """See ``ReplayObserver``."""
         self._explainer.decided(companion, number, time_s, target, decision)
+        if decision.new_path is not None:  # who goes to this decision is to see where it leads
+            self._frame_s = self._path_s = -math.inf
 
     def ticked(self, companion: Companion, time_s: float) -> None:
         """See ``ReplayObserver``."""

@@ -122,6 +122,14 @@ def test_the_page_of_a_report_knows_how_often_data_came(made: Path) -> None:
     assert middle["heartbeat_age_s"] < 1.5 and middle["position_age_s"] < 0.3
 
 
+def test_who_goes_to_a_decision_sees_its_new_path(made: Path) -> None:
+    data = report_data_in(made / "r.html")
+    told = {"new path", "current path blocked: new path", "a better path"}
+    decided = [one["t"] for one in data["decisions"] if one["reason"] in told]
+    shown = [one["t"] for one in data["frames"] if "path" in one]
+    assert len(decided) > 1 and [t for t in decided if t not in shown] == []
+
+
 LAPS_S = 600.0
 """So long a drive is what the size of a report is told for."""
 
