@@ -25,6 +25,9 @@ SLACK_M_S = 0.3
 """A rover on firm ground is so much slower than its throttle says: it is read in whole per cent, and late."""
 FORGOTTEN_S = 0.5
 """What it was held by falls off with this time constant: the throttle is read ten times a second."""
+DRAGS_M_S, DRAGS_SHARE, DRAGS_S = 0.4, 0.5, 1.0
+"""Ground drags a rover that is held for so long by so much, and by such a share of its own speed. Less may be a rover
+that gathers speed, or whose throttle says something else than the companion was told."""
 HELD_M_S = 0.2
 """A rover that is held by less stands soon enough."""
 ROLLS_M_S = 0.1
@@ -44,6 +47,7 @@ class DragWatch:
         self._time_s = -math.inf
         self._held_m_s = 0.0
         self._held_until_s = -math.inf
+        self._light_s: float | None = None
 
     def held_m_s(self, throttle: ThrottleSeen | None, full_m_s: float, view: LocalView) -> float:
         """Once a tick: how much slower the rover is, or was just now, than firm ground would let it go.
@@ -59,7 +63,14 @@ class DragWatch:
         self._held_m_s = max(held_m_s, kept * self._held_m_s)
         if self._held_m_s >= HELD_M_S:
             self._held_until_s = now_s
+        if self._light_s is None or self._held_m_s < max(DRAGS_M_S, DRAGS_SHARE * view.speed_m_s):
+            self._light_s = now_s
         return self._held_m_s
+
+    def dragged_m_s(self) -> float:
+        """By how much the ground has dragged it for some time; 0 where it does not."""
+        drags = self._light_s is not None and self._time_s - self._light_s >= DRAGS_S
+        return self._held_m_s if drags else 0.0
 
     def closes(self) -> bool:
         """Whether the throttle may still be open from when the ground held the rover."""

@@ -87,7 +87,7 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
     follows, lasts_s = view.following, view.settings.guidance.velocity_lasts_s
     latest_s = _latest_s(follows)
     tells = _tells(setpoint, view, latest_s)
-    start = np.array((*_from_corner(view), view.pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s))
+    start = np.array((*_from_corner(view), view.pose.heading_rad, view.shoots_m_s, view.yaw_rate_rad_s))
     ends_s = latest_s + lasts_s
     ways = []
     for gain in turn_gains(follows, lasts_s):

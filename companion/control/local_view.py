@@ -28,7 +28,8 @@ class LocalView:
 
     ``told``: the setpoint of the tick before; None where there was none. ``lately``: the velocities told before.
     ``placed_s``: when a position was told last.
-    ``held_m_s``: so much slower than its throttle would let it go on firm ground. ``rolls_back``: it moves tail first.
+    ``held_m_s``: so much slower than its throttle would let it go on firm ground; ``dragged_m_s``: and for some time,
+    0 where that may have another reason. ``rolls_back``: it moves tail first.
     ``following``: how it follows velocities, as far as is known. ``body``: its outline, if it is no circle.
     ``scans``: so many have been taken into the map.
     """
@@ -40,6 +41,7 @@ class LocalView:
     settings: Settings
     yaw_rate_rad_s: float = 0.0
     held_m_s: float = 0.0
+    dragged_m_s: float = 0.0
     told: Setpoint | None = None
     lately: Told = ()
     placed_s: float = -math.inf
@@ -57,6 +59,11 @@ class LocalView:
     def forward_m_s(self) -> float:
         """Its speed, below 0 if it rolls tail first."""
         return -self.speed_m_s if self.rolls_back else self.speed_m_s
+
+    @property
+    def shoots_m_s(self) -> float:
+        """How fast it goes forwards, below 0 back, if the ground that drags it ends now."""
+        return self.forward_m_s + math.copysign(self.dragged_m_s, self.forward_m_s)
 
     def by_position(self, time_s: float) -> bool:
         """Whether a position was in force then."""

@@ -138,6 +138,7 @@ class MotionController:
         self._note_way(view, passed_s)
         problem = self._problem(path, view, model)
         worst = problem._replace(
+            start=problem.start._replace(speed_m_s=view.shoots_m_s),
             model=worst_model(model, view.following),
             pending=_pending(view, _latest(view), ALONE_STEP_S),
             step_s=ALONE_STEP_S,
@@ -202,7 +203,7 @@ class MotionController:
 
 def _stops_at(view: LocalView, model: RoverModel) -> NedPoint:
     """Where it comes to stand if it brakes straight on, as late and as little as is to be reckoned with."""
-    worst, speed_m_s = worst_model(model, view.following), abs(view.forward_m_s)
+    worst, speed_m_s = worst_model(model, view.following), abs(view.shoots_m_s)
     stops_m = speed_m_s * _latest(view) * ALONE_STEP_S + speed_m_s**2 / (2.0 * worst.decel_m_s2)
     course_rad = view.pose.heading_rad + (math.pi if view.rolls_back else 0.0)
     return view.pose.point.moved(course_rad, stops_m)

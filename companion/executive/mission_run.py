@@ -203,7 +203,8 @@ class MissionRun:
         told = None if self._told is None else self._told.setpoint
         full_m_s = full_throttle_m_s(self.vehicle.parameters)
         held_m_s = self._drag.held_m_s(self.vehicle.throttle, full_m_s, view)
-        view = changed(view, held_m_s=held_m_s, told=told, lately=self._lately, placed_s=self._placed_s)
+        view = changed(view, held_m_s=held_m_s, dragged_m_s=self._drag.dragged_m_s())
+        view = changed(view, told=told, lately=self._lately, placed_s=self._placed_s)
         executor.learn(view)
         wanted = executor.guide(task, view)
         wanted = self.legs.guide(wanted, executor, view)

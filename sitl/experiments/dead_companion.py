@@ -77,6 +77,8 @@ class Death:
     """It stood, and something that moves came along."""
     went_m: float
     went_s: float
+    with_what: tuple[str, ...] = ()
+    """What it touched while it moved on, and how fast it was then."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -138,7 +140,7 @@ def _death(told: Told, time_s: float, simulator: Simulator) -> Death:
     before = len(simulator.collisions)
     went_s = watch_until_it_stands(simulator)
     hits = simulator.collisions[before:]
-    standing = [one for one in hits if one.was_run_into]
+    moving = [one for one in hits if not one.was_run_into]
     return Death(
         told.mission.name,
         told.suite,
@@ -146,10 +148,11 @@ def _death(told: Told, time_s: float, simulator: Simulator) -> Death:
         told.seed,
         time_s,
         speed_m_s,
-        len(hits) - len(standing),
-        len(standing),
+        len(moving),
+        len(hits) - len(moving),
         simulator.driven_m - since_m,
         went_s,
+        tuple(f"{one.what} at {one.speed_m_s:.1f} m/s" for one in moving),
     )
 
 
@@ -241,7 +244,17 @@ contacts while it moved on: **{touched}**; *run into*: it stood already (slower 
 that moves came along: {run_into}. *m/s*: the fastest it was; *metres*, *s*: how far and how long it went on at most.
 {self._rover()}
 {tables}
-"""
+{self._contacts()}"""
+
+    def _contacts(self) -> str:
+        """Each contact while the rover moved on, as a list."""
+        lines = [
+            f"- {one.mission}, `{one.suite}`, seed {one.seed}, dead after {one.time_s:.1f} s "
+            f"at {one.speed_m_s:.1f} m/s: {', '.join(one.with_what)}, {one.went_m:.1f} m farther"
+            for one in self.deaths
+            if one.touched
+        ]
+        return "\n".join(["\nWhat was touched:\n", *lines, ""]) if lines else ""
 
     def _rover(self) -> str:
         """What is not as usual, as a paragraph."""

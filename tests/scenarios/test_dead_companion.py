@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,9 @@ def test_the_table_counts_what_it_says() -> None:
         Death("Yard", "beams", "points", 0, 50.0, speed, touched, 1, 3.0, 5.0)
         for speed, touched in ((1.0, 2), (0.0, 0))
     )
+    hit = replace(deaths[0], touched=1, with_what=("walker at 0.7 m/s",))
+    told = "- Yard, `beams`, seed 0, dead after 50.0 s at 1.0 m/s: walker at 0.7 m/s, 3.0 m farther"
+    assert told in DeadReport(Options(runs=1), (hit,)).section()
     report = DeadReport(Options(runs=2), deaths)
     (table,) = report.tables()
     assert [list(column.cells)[-1] for column in table.columns] == ["all", "", "2", "1", "2", "2", "1.0", "3.0", "5.0"]

@@ -76,22 +76,28 @@ CORNERS = ((2.2, 15.3), (-2.3, 15.2), (-2.3, 0.5), (2.3, 14.0))
 
 @pytest.mark.thorough
 def test_who_cannot_turn_on_the_spot_keeps_inside_a_narrow_strip_by_itself(tmp_path: Path) -> None:
-    """Targets in the corners: it must back out again and again. The check of setpoints has nothing to refuse."""
+    """Targets in the corners: it must back out again and again, and may jam in one of them. Whatever it does, it stays
+    inside, and the check of setpoints has nothing to refuse. Three seeds."""
     Image.new("L", (30, 20), 255).save(tmp_path / "strip.png")
     targets = "".join(f"[[target]]\nnorth_m = {north_m}\neast_m = {east_m}\n" for north_m, east_m in CORNERS)
     (tmp_path / "strip.toml").write_text(STRIP + targets)
-    rig = Watched(load_mission(tmp_path / "strip.toml"), seed=2)
-    inside_m = []
-    while not rig.companion.done:
-        rig.companion.tick()
-        pose = rig.companion.vehicle.pose_at(rig.now_s())
-        if pose is not None and abs(rig.simulator.truth.speed_m_s) > 0.1:  # where it stands the position wanders
-            inside_m.append(min(3.0 - abs(pose.north_m), pose.east_m + 1.5, 16.0 - pose.east_m))
-        assert rig.now_s() < 400.0
-    assert rig.companion.outcome.complete and rig.companion.mission_run.setpoint_check.refused == {}
-    assert min(inside_m) >= 0.35, "by the position that it is told: the whole body"
-    assert min(min(3.0 - abs(north_m), 16.0 - east_m) for north_m, east_m in rig.track) > 0.0
-    assert rig.companion.driver is not None and rig.companion.driver.tally.stuck > 0
+    reached = stuck = 0
+    for seed in (0, 2, 3):
+        rig = Watched(load_mission(tmp_path / "strip.toml"), seed=seed)
+        inside_m = []
+        while not rig.companion.done:
+            rig.companion.tick()
+            pose = rig.companion.vehicle.pose_at(rig.now_s())
+            if pose is not None and abs(rig.simulator.truth.speed_m_s) > 0.1:  # where it stands the position wanders
+                inside_m.append(min(3.0 - abs(pose.north_m), pose.east_m + 1.5, 16.0 - pose.east_m))
+            assert rig.now_s() < 400.0
+        assert rig.companion.mission_run.setpoint_check.refused == {}
+        assert min(inside_m) >= 0.35, "by the position that it is told: the whole body"
+        assert min(min(3.0 - abs(north_m), 16.0 - east_m) for north_m, east_m in rig.track) > 0.0
+        assert rig.companion.driver is not None
+        reached += sum(status is TargetStatus.REACHED for _, status in rig.companion.statuses())
+        stuck += rig.companion.driver.tally.stuck
+    assert reached >= 10 and stuck > 0, (reached, stuck)
 
 
 def changes(rig: Rig) -> list[int]:

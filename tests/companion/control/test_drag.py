@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 from companion.control.controller import ControlCommand, Purpose
-from companion.control.drag import BACK_M_S, CLOSES_S, FORGOTTEN_S, SLACK_M_S, STALE_S, DragWatch, braked_harder
+from companion.control.drag import (
+    BACK_M_S,
+    CLOSES_S,
+    DRAGS_S,
+    FORGOTTEN_S,
+    SLACK_M_S,
+    STALE_S,
+    DragWatch,
+    braked_harder,
+)
 from companion.control.local_view import MOST_FURTHER_M, LocalView
 from companion.core.frames import Pose
 from companion.mission.bounds import Bounds
@@ -114,3 +123,24 @@ def test_it_is_told_no_more_than_it_may_be_left_alone_with(wall_m: float, back_m
         put(map_, pose.north_m - wall_m, float(east_m))
     held = replace(view(map_, pose, 0.3), held_m_s=1.0)
     assert braked_harder(STAND, held, Bounds(), closes=True).setpoint == GuidedVelocity(-back_m_s, 0.0)
+
+
+def test_ground_drags_only_a_rover_that_is_held_much_and_for_long() -> None:
+    def dragged_m_s(share: float, speed_m_s: float, seconds: float) -> float:
+        watch = DragWatch()
+        for tick in range(round(seconds / 0.05) + 1):
+            held_m_s(watch, share, speed_m_s, 0.05 * tick)
+        return watch.dragged_m_s()
+
+    gravel = 1.0 * FULL_M_S - 0.8 - SLACK_M_S
+    assert dragged_m_s(1.0, 0.8, DRAGS_S + 0.1) == pytest.approx(gravel)
+    assert dragged_m_s(1.0, 0.8, DRAGS_S - 0.2) == 0.0, "it may gather speed"
+    assert dragged_m_s(0.65, 2.0, 5.0) == 0.0, "it may be a third off what its throttle says"
+    assert dragged_m_s(0.15, 0.0, 5.0) == 0.0, "too little"
+
+
+@pytest.mark.parametrize(("rolls_back", "shoots_m_s"), [(False, 2.3), (True, -2.3)])
+def test_a_dragged_rover_shoots_the_way_it_rolls(rolls_back: bool, shoots_m_s: float) -> None:
+    held = replace(view(ground()), speed_m_s=0.8, dragged_m_s=1.5, rolls_back=rolls_back)
+    assert held.shoots_m_s == pytest.approx(shoots_m_s)
+    assert replace(held, dragged_m_s=0.0).shoots_m_s == held.forward_m_s

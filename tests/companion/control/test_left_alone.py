@@ -73,6 +73,14 @@ def test_the_whole_outline_counts_not_a_circle(north_m: float, east_m: float, re
     assert fault(GuidedVelocity(0.5, 0.0), view(evidence)) is wanted
 
 
+def test_a_rover_that_ground_drags_may_shoot_ahead_where_it_ends() -> None:
+    evidence = open_ground()
+    put(evidence, 2.5, 0.02)
+    told, held = GuidedVelocity(0.8, 0.0), view(evidence, 0.8)
+    assert fault(told, held) is None
+    assert fault(told, replace(held, dragged_m_s=1.5)) is SetpointFault.INTO_OBSTACLE
+
+
 def test_a_long_rover_that_stands_may_not_turn_against_a_post_and_a_round_one_may() -> None:
     evidence = open_ground()
     put(evidence, 0.65, 0.35)

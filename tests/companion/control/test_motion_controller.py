@@ -319,3 +319,13 @@ def test_without_a_guard_a_rover_keeps_more_room_and_more_of_it_in_turns() -> No
     short, long = (turn_gains(KNOWN, one.guidance.velocity_lasts_s) for one in (GUARDED, STRICT))
     assert max(long) == pytest.approx(max(short) + 0.1) and min(long) == pytest.approx(min(short) - 0.1)
     assert _faster_s(strict) == pytest.approx(_faster_s(guarded) + 0.2)
+
+
+def test_on_ground_that_drags_it_goes_slower_where_it_could_not_stop_if_that_ground_ended() -> None:
+    evidence = ground()
+    wall(evidence, 9.0, 0.0, 20.0)
+    path = ReferencePath(np.array(((3.0, 10.0), (8.0, 10.0))))
+    held = view(evidence, Pose(5.5, 10.0, 0.0, 1.0), 0.8)
+    fast, slow = (controller().follow(path, one).setpoint for one in (held, replace(held, dragged_m_s=1.5)))
+    assert isinstance(fast, GuidedVelocity) and isinstance(slow, GuidedVelocity)
+    assert fast.forward_m_s > 0.5 > slow.forward_m_s + 0.3
