@@ -10,13 +10,14 @@ Nouns: point controller.
 from __future__ import annotations
 
 import math
+from collections import deque
 
 from companion.control.braking import braking_distance_m, farthest_m, fastest_within_m, overshoot_m, stopping_distance_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, Points, ReferencePath
 from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, unseen_flank
-from companion.core.frames import Pose, wrap_pi_rad
+from companion.core.frames import NedPoint, Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.map_queries import ArcQueries, clearance_m, look_along
 from companion.settings import GuidanceSettings
@@ -39,6 +40,9 @@ SHOOTS_M = 0.1
 """A rover that the ground holds may go so much farther: then it counts as rolling, however slow it is."""
 CREEPS_NARROW_M = 0.4
 """Near walls of which thin beams saw only points it creeps no farther at a time: the map may be off by as much."""
+HIDDEN_M, HIDDEN_FROM_M = 0.3, 0.3
+"""Ground that a look has not shown is not looked at again from so near; it lies behind something, or in it."""
+HIDDEN_KEPT = 8
 ANEW_S = 0.15
 """Longer than the 0.1 s after which ArduRover shapes a position target from where the rover is."""
 
@@ -57,6 +61,8 @@ class PointController:
         self._looking_rad: float | None = None
         self._looked = False
         """It has looked, there was nothing, and it turns to where it drives: with as little reach as any other."""
+        self._hidden: deque[tuple[NedPoint, NedPoint]] = deque(maxlen=HIDDEN_KEPT)
+        """Places that were looked at and stayed unseen, and from where."""
         self._braking = False
         self._swinging = False
         self._anew_s: float | None = None
@@ -122,11 +128,50 @@ class PointController:
         if short or reach.distance_m == 0.0:
             if self._looking_rad is not None and not _is_turned_to(self._looking_rad, pose, settings):
                 return turn_to(self._looking_rad, view)
-            look = _look_or_blocked(path, view)
-            if look.purpose is not Purpose.DRIVE or reach.distance_m < settings.least_reach_m:
+            look = self._look_or_blocked(path, view)
+            has_looked = look.purpose in (Purpose.DRIVE, Purpose.BLOCKED)
+            if not has_looked or reach.distance_m < settings.least_reach_m:
                 return look
             self._looked = True
         return self._drive(path, reach, view)
+
+    def _look_or_blocked(self, path: ReferencePath, view: LocalView) -> ControlCommand:
+        """The next piece is not clear, or has not been seen: turn to it; when turned and still so, it is blocked."""
+        pose, evidence, radius_m, settings = view.pose, view.evidence, view.rover.radius_m, view.settings.guidance
+        ahead = path.point_ahead(settings.look_ahead_m)
+        line = look_along(evidence, pose.point, ahead, radius_m)
+        distance_m = pose.point.distance_m(ahead)
+        unseen = self._unseen_beside(path, view) if line.seen_m >= distance_m - 0.05 else None
+        if unseen is not None:
+            bearing = pose.point.bearing_rad(unseen)
+            if not _is_turned_to(bearing, pose, settings):
+                return turn_to(bearing, view)
+            self._hidden.append((unseen, pose.point))
+        bearing = pose.point.bearing_rad(ahead)
+        if unseen is None and not _is_turned_to(bearing, pose, settings):
+            return turn_to(bearing, view)
+        if line.clear_m >= distance_m - 0.05:
+            # It has looked, and nothing is there but ground between the beams: creep, up to the next obstacle.
+            creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
+            # A rover that made way may stand farther from its path than it may be sent.
+            creep_m = min(creep_m, farthest_m(view.speed_m_s, settings, narrow=view.rover.narrow_sight))
+            creep_m = _creeps_m(creep_m, bearing, view)
+            if creep_m >= CREEPS_M:
+                target = pose.point.moved(bearing, creep_m)
+                return ControlCommand(Purpose.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
+        return stop_for(Purpose.BLOCKED)
+
+    def _unseen_beside(self, path: ReferencePath, view: LocalView) -> NedPoint | None:
+        """The first unseen place beside the next piece, unless a look from here has not shown it."""
+        unseen = unseen_flank(view, path.point_ahead(view.settings.guidance.reach_after_look_m))
+        if unseen is None:
+            return None
+        here = view.pose.point
+        is_hidden = any(
+            unseen.place.distance_m(place) < HIDDEN_M and here.distance_m(begun) < HIDDEN_FROM_M
+            for place, begun in self._hidden
+        )
+        return None if is_hidden else unseen.place
 
     def _drive(self, path: ReferencePath, reach: Reach, view: LocalView) -> ControlCommand:
         """Drive to a place in reach: turn first where it lies far aside, then as fast as the surroundings allow."""
@@ -239,30 +284,6 @@ def _reach_after_look_m(view: LocalView) -> float:
     settings = view.settings.guidance
     longest_m = farthest_m(0.0, settings, narrow=view.rover.narrow_sight)
     return min(settings.reach_after_look_m, longest_m - STEP_M)
-
-
-def _look_or_blocked(path: ReferencePath, view: LocalView) -> ControlCommand:
-    """The next piece is not clear, or has not been seen: turn to it; when turned and still so, it is blocked."""
-    pose, evidence, radius_m, settings = view.pose, view.evidence, view.rover.radius_m, view.settings.guidance
-    ahead = path.point_ahead(settings.look_ahead_m)
-    line = look_along(evidence, pose.point, ahead, radius_m)
-    distance_m = pose.point.distance_m(ahead)
-    unseen = unseen_flank(view, path.point_ahead(settings.reach_after_look_m))
-    target = ahead if line.seen_m < distance_m - 0.05 or unseen is None else unseen.place
-    bearing = pose.point.bearing_rad(target)
-    if not _is_turned_to(bearing, pose, settings):
-        return turn_to(bearing, view)
-    if line.clear_m >= distance_m - 0.05:
-        # It has looked, and nothing is there but ground between the beams: creep, up to the next obstacle.
-        bearing = pose.point.bearing_rad(ahead)
-        creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
-        # A rover that made way may stand farther from its path than it may be sent.
-        creep_m = min(creep_m, farthest_m(view.speed_m_s, settings, narrow=view.rover.narrow_sight))
-        creep_m = _creeps_m(creep_m, bearing, view)
-        if creep_m >= CREEPS_M:
-            target = pose.point.moved(bearing, creep_m)
-            return ControlCommand(Purpose.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
-    return stop_for(Purpose.BLOCKED)
 
 
 def _creeps_m(distance_m: float, bearing_rad: float, view: LocalView) -> float:

@@ -41,7 +41,7 @@ export class Headline {
     const line = trouble || sentence(frame?.line) || (open ? "Waiting for the run to begin" : "Connecting");
     setText(this.line, line);
     setAttribute(this.line, "data-long", line.length > LONG ? "" : null);
-    setText(this.spoken, trouble ? trouble.replace(/ since.*/, "") : (frame?.line ?? ""));
+    setText(this.spoken, trouble ? trouble.replace(/ for \d.*/, "") : (frame?.line ?? ""));
     setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
     setText(this.mission, scene?.mission ?? "");
     setText(this.badge, scene ? badge(scene, state === "ended", trouble, open) : "");

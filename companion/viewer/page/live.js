@@ -146,11 +146,11 @@ class LivePage {
     const silent = this.silentFor();
     if (this.model.frame?.state === "ended") return "";
     const heartbeat = this.model.frame?.rates?.heartbeat_age_s;
-    if (silent < STALE_MS && heartbeat > SILENT_S) return `Autopilot silent since ${lasting(heartbeat)}`;
+    if (silent < STALE_MS && heartbeat > SILENT_S) return `Autopilot silent for ${lasting(heartbeat)}`;
     if (silent < STALE_MS) return "";
-    const since = lasting(silent / 1000);
-    if (this.link?.open) return this.model.frame ? `No data since ${since}` : "";
-    return `${this.why || "No connection"} since ${since}`;
+    const time = lasting(silent / 1000);
+    if (this.link?.open) return this.model.frame ? `No data for ${time}` : "";
+    return `${this.why || "No connection"} for ${time}`;
   }
 }
 

@@ -145,9 +145,9 @@ const headline = new Headline();
 const [drives, ended] = [{ state: "driving", t: 1 }, { state: "ended", t: 2 }];
 const [run, simulator, record] = [{ live: true }, { live: true, truth: true }, { live: false }];
 const shown = [
-  [run, drives, "", true], [run, drives, "No connection since 3 s", false],
-  [run, drives, "Not connected: a token is needed", false], [run, drives, "No data since 3 s", true],
-  [run, ended, "", false], [simulator, drives, "", true], [simulator, drives, "No connection since 3 s", false],
+  [run, drives, "", true], [run, drives, "No connection for 3 s", false],
+  [run, drives, "Not connected: a token is needed", false], [run, drives, "No data for 3 s", true],
+  [run, ended, "", false], [simulator, drives, "", true], [simulator, drives, "No connection for 3 s", false],
   [simulator, ended, "", false], [record, drives, "", false],
 ];
 tell(shown.map((one) => (headline.show(...one), headline.badge.textContent)));
