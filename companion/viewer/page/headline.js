@@ -76,10 +76,18 @@ function reached({ statuses = [] }) {
 // why; in the end, what it came to.
 function reason(frame, state) {
   if (!frame) return "";
+  if (state === "ended") return cameTo(frame);
   if (state !== "driving" && frame.why) return sentence(frame.why);
-  if (state === "ended") return frame.statuses?.length ? `${reached(frame)} of ${frame.statuses.length} targets reached` : "";
   if (state !== "driving") return "";
   return [sentence(frame.why), onTheWay(frame)].filter(Boolean).join(" · ");
+}
+
+// Where targets are missed the large line counts them, and `why` names them.
+function cameTo(frame) {
+  const all = frame.statuses?.length ?? 0;
+  const count = all ? `${reached(frame)} of ${all} targets reached` : "";
+  if (!frame.why) return count;
+  return all && reached(frame) === all ? `${count} · ${sentence(frame.why)}` : sentence(frame.why);
 }
 
 function onTheWay(frame) {

@@ -327,3 +327,23 @@ tell(plates);
         assert left >= 0 and left + wide <= width - covered_right
     beside = scale[0] + scale[2] <= colours[0]
     assert beside if width - covered_right > 300 else colours[1] + colours[3] <= scale[1]
+
+
+def test_in_the_end_it_says_what_the_run_came_to_and_how_the_rover_is_left(tmp_path: Path) -> None:
+    script = """
+const { Headline } = await import("./headline.js");
+const headline = new Headline();
+const armed = "the rover is still armed, in HOLD";
+const moments = [
+  { statuses: ["reached", "reached"], line: "done", why: armed },
+  { statuses: ["reached", "reached"], line: "done", why: "" },
+  { statuses: ["reached", "pending"], line: "ended: 1 of 2 targets reached", why: "b: not reached" },
+];
+const show = (one) => (headline.show({ live: true }, { state: "ended", t: 1, ...one }), headline.why.textContent);
+tell(moments.map(show));
+"""
+    assert ran(tmp_path, DOCUMENT + script) == [
+        "2 of 2 targets reached · The rover is still armed, in HOLD",
+        "2 of 2 targets reached",
+        "B: not reached",
+    ]
