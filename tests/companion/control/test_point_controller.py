@@ -393,3 +393,23 @@ def test_a_rover_that_turns_as_told_has_soon_looked_enough(seed):
             headings += 1
             pose = Pose(pose.north_m, pose.east_m, answer.setpoint.heading_rad, pose.time_s + 2.0)
     assert 0 < headings < 6
+
+
+def test_ground_that_a_look_has_not_shown_is_not_looked_at_again_from_there():
+    """Round the end of a wall: what lies in the wall is never seen. The rover turned to and fro for 20 s there."""
+    ground, controller, pose, answers = looked(), PointController(), replace(HERE, heading_rad=1.4), []
+    frame = ground.map.frame
+    (east, face), (_, back) = frame.xy(NedPoint(11.0, 10.9)), frame.xy(NedPoint(12.0, 10.9))
+    ground.map.log_odds[int(face) : int(back), : int(east)] = 0.0
+    ground.map.log_odds[int(face), : int(east) - 1] = 3.0
+    corners = np.array([(10.5, 10.5), (10.8, 11.2), (11.75, 11.0), (12.3, 10.4), (13.0, 9.7)])
+    along = np.linspace(0.0, 4.0, 20)
+    path = ReferencePath(np.column_stack([np.interp(along, np.arange(5.0), corners[:, axis]) for axis in range(2)]))
+    for _ in range(6):
+        answers.append(controller.follow(path, view(ground, pose)))
+        match answers[-1].setpoint:
+            case GuidedHeading(heading_rad):
+                pose = replace(pose, heading_rad=heading_rad, time_s=pose.time_s + 2.0)
+            case GuidedPosition(point):  # it begins by turning there
+                pose = replace(pose, heading_rad=pose.point.bearing_rad(point), time_s=pose.time_s + 1.0)
+    assert [one.purpose for one in answers] == [Purpose.LOOK, *[Purpose.DRIVE] * 5]
