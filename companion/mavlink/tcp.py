@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import select
 import socket
 
@@ -65,6 +67,8 @@ class TcpLink:
         self._clock = clock
         self._back_off = BackOff()
         self._connecting: socket.socket | None = None
+        self._refused = ""
+        """Why the last attempt failed, in the system's words."""
         self._began_s = 0.0
         self._stream: _Stream | None = None
         self._closed = False
@@ -73,7 +77,8 @@ class TcpLink:
     @property
     def description(self) -> str:
         """The link in words."""
-        return self._name if self.connected else f"{self._name} (not connected)"
+        why = f": {self._refused}" if self._refused else ""
+        return self._name if self.connected else f"{self._name} (not connected{why})"
 
     @property
     def connected(self) -> bool:
@@ -117,16 +122,23 @@ class TcpLink:
                 return
             self._connecting = socket.socket(self._family, socket.SOCK_STREAM)
             self._connecting.setblocking(False)
-            self._connecting.connect_ex(self._address)
+            self._note_error(self._connecting.connect_ex(self._address))
             self._began_s = now_s
         _, writable, _ = select.select([], [self._connecting], [], 0)
-        if writable and self._connecting.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) == 0 and self._is_up():
+        error = self._connecting.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) if writable else 0
+        self._note_error(error)
+        if writable and error == 0 and self._is_up():
             self._stream = _Stream(self._connecting)
-            self._connecting = None
+            self._connecting, self._refused = None, ""
             self._back_off.reset()
         elif writable or now_s - self._began_s > CONNECT_TIMEOUT_S:
+            self._refused = self._refused if writable else "no answer"
             self._connecting.close()
             self._connecting = None
+
+    def _note_error(self, error: int) -> None:
+        if error not in (0, errno.EINPROGRESS):
+            self._refused = os.strerror(error).lower()
 
     def _is_up(self) -> bool:
         """Whether there is a peer: a refused connection is writable too, and its error may have been fetched before."""

@@ -10,6 +10,9 @@ from companion.mission.mission import Mission, MissionError
 from companion.mission.toml_reader import load as load_toml
 from companion.storage.files import why_no_file
 
+MISSIONS = Path("missions")
+"""Where the missions lie that ship with the source."""
+
 
 def load_mission(path: Path, *, simulated: bool = True, skip_unknown: bool = False) -> Mission:
     """Read and check a mission. ``simulated``: also what only the simulator needs.
@@ -21,7 +24,7 @@ def load_mission(path: Path, *, simulated: bool = True, skip_unknown: bool = Fal
     """
     suffix = path.suffix.lower()
     if fault := why_no_file(path):
-        raise MissionError(f"{path}: {fault}")
+        raise MissionError(f"{path}: {fault}{_meant(path)}")
     if suffix == ".toml":
         return load_toml(path, simulated=simulated)
     if suffix not in SUFFIXES:
@@ -33,3 +36,13 @@ def load_mission(path: Path, *, simulated: bool = True, skip_unknown: bool = Fal
         )
     check_mission(mission)
     return mission
+
+
+def _meant(path: Path) -> str:
+    """What a name without suffix or folder may have meant, for people; empty if no such file is there."""
+    if path.exists() or path.suffix:
+        return ""
+    for place in (path.with_name(f"{path.name}.toml"), MISSIONS / f"{path.name}.toml"):
+        if path.name and place.is_file():
+            return f" ({place} is there)"
+    return ""

@@ -311,7 +311,7 @@ class TestUrls:
             ("udpin:127.0.0.1:0", "udpin:127.0.0.1:0 (nobody has spoken yet)"),
             ("udp:127.0.0.1:0", "udpin:127.0.0.1:0 (nobody has spoken yet)"),
             ("udpout:localhost:14550", "udpout:localhost:14550"),
-            ("tcp:127.0.0.1:9", "tcp:127.0.0.1:9 (not connected)"),
+            ("tcp:127.0.0.1:9", "tcp:127.0.0.1:9 (not connected: connection refused)"),
             ("tcpin:127.0.0.1:0", "tcpin:127.0.0.1:0 (nobody has connected yet)"),
             ("tcpin:[::1]:0", "tcpin:::1:0 (nobody has connected yet)"),
         ],
