@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from companion.app import Companion, Status
 from companion.core.grid import Cell
-from companion.navigation.field_step import Decision
+from companion.navigation.field_step import Decision, DecisionReason
 from companion.recording.contacts import Contact, contacts_of
 from companion.recording.reader import Record
 from companion.recording.record_clock import record_clock
@@ -37,6 +37,8 @@ from companion.viewer.wire import tile_message
 
 FRAME_S, PATH_S, TILES_S = 0.4, 1.2, 1.0
 """So often each is kept."""
+GOES_ON = (DecisionReason.FOLLOWING, DecisionReason.NO_BETTER_PATH)
+"""Decisions with which the rover goes on as before, like going back for the second time in a row."""
 MOST_PLACES = 120
 """Of a candidate."""
 
@@ -125,6 +127,7 @@ class ReportWatch(ReplayObserver):
         self._mission = record.mission
         turning_radius_m = record.mission.rover.turning_radius_m
         self._explainer = DecisionExplainer(None, record.settings, turning_radius_m, self._explained)
+        self._reason: DecisionReason | None = None
         self._before: Json = {}
         self._rates = Arrivals()
         self._news: list[Json] = []
@@ -214,6 +217,8 @@ class ReportWatch(ReplayObserver):
 
     def _explained(self, why: Explanation) -> None:
         decision = why.decision
+        before, self._reason = self._reason, decision.reason
+        goes_on = decision.reason in GOES_ON or decision.reason is before is DecisionReason.GOING_BACK
         self.decisions.append(
             {
                 "number": why.number,
@@ -222,6 +227,7 @@ class ReportWatch(ReplayObserver):
                 "action": str(decision.action),
                 "part": str(decision.part),
                 "reason": str(decision.reason),
+                "goes_on": goes_on,
                 "lines": explanation_lines(why)[1:],
                 "candidates": [_candidate(one, why, self._steady) for one in why.candidates],
             }

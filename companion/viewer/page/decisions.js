@@ -14,8 +14,19 @@ export class Decisions {
     this.head = make("h2");
     this.why = make("div", { class: "why-decision" });
     this.list = make("ol", { class: "decision-list" });
-    this.node = make("div", { class: "decisions" }, this.why, make("section", {}, this.head, this.list));
+    this.only = make("input", { type: "checkbox", onchange: () => this.filter() });
+    const only = make("label", { class: "decision-filter" }, this.only, "Only where it does not just go on");
+    this.node = make("div", { class: "decisions" }, this.why, make("section", {}, this.head, only, this.list));
     setText(this.head, `${record.decisions.length} decisions`);
+    this.listed = record.decisions.map((_, i) => i);
+  }
+
+  /** Lists all decisions, or those with which the rover does not just go on as before. */
+  filter() {
+    const all = this.record.decisions.map((_, i) => i);
+    this.listed = this.only.checked ? all.filter((i) => !this.record.decisions[i].goes_on) : all;
+    this.from = -1;
+    this.showList();
   }
 
   /** The decision that is valid at a time. */
@@ -84,28 +95,27 @@ export class Decisions {
   }
 
   showList() {
-    const from = Math.max(0, Math.min(this.current - ROWS / 2, this.record.decisions.length - ROWS));
+    const { listed } = this;
+    const current = lastNotAbove(listed, this.current); // in the list: the one in force, or the last before it
+    const from = Math.max(0, Math.min(current - ROWS / 2, listed.length - ROWS));
     if (from !== this.from) {
       this.from = from;
-      const { decisions } = this.record;
-      this.rows = decisions.slice(from, from + ROWS).map((decision) => this.row(decision));
+      this.rows = listed.slice(from, from + ROWS).map((i) => this.row(this.record.decisions[i]));
       this.list.replaceChildren(
         ...this.more(from, "earlier", from - 1),
         ...this.rows,
-        ...this.more(decisions.length - from - this.rows.length, "later", from + this.rows.length),
+        ...this.more(listed.length - from - this.rows.length, "later", from + this.rows.length),
       );
     }
-    this.rows.forEach((row, i) =>
-      setAttribute(row, "aria-current", from + i === this.current ? "true" : null),
-    );
-    const row = this.rows[this.current - from];
+    this.rows.forEach((row, i) => setAttribute(row, "aria-current", from + i === current ? "true" : null));
+    const row = this.rows[current - from];
     this.list.scrollTop = row ? row.offsetTop - this.list.offsetTop - this.list.clientHeight / 2 : 0;
   }
 
   /** What is not in the list, as a button that goes there. */
   more(count, when, next) {
     if (count <= 0) return [];
-    const go = () => this.jump(this.record.decisionTimes[next]);
+    const go = () => this.jump(this.record.decisionTimes[this.listed[next]]);
     const text = `${count} ${when} ${count === 1 ? "decision" : "decisions"}`;
     return [make("li", {}, make("button", { type: "button", class: "more", onclick: go }, text))];
   }

@@ -347,3 +347,25 @@ tell(moments.map(show));
         "2 of 2 targets reached",
         "B: not reached",
     ]
+
+
+def test_decisions_with_which_the_rover_just_goes_on_can_be_left_out(tmp_path: Path) -> None:
+    script = """
+const { Decisions } = await import("./decisions.js");
+const times = Array.from({ length: 400 }, (_, i) => i);
+const decisions = times.map((t) => ({ t, number: t + 1, action: "follow", reason: "", goes_on: t % 20 !== 0 }));
+let to = null;
+const list = new Decisions({ decisions, decisionTimes: times, scene: {} }, (t) => { to = t; });
+list.show(150);
+list.only.checked = true;
+list.only.onchange();
+const rows = list.list.children;
+const current = rows.filter((row) => row.attributes["aria-current"]).map((row) => row.textContent);
+rows[3].children[0].onclick();
+const few = rows.length;
+list.only.checked = false;
+list.only.onchange();
+tell([few, current, to, list.list.children.length]);
+"""
+    few, current, to, all_rows = ran(tmp_path, DOCUMENT + script)
+    assert (few, to, all_rows) == (20, 60, 122) and len(current) == 1 and "141" in current[0]

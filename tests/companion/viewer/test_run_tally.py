@@ -17,7 +17,7 @@ def moment(time_s: float, heard_s: float) -> Any:
     position = SimpleNamespace(time_s=100.0 + heard_s)
     vehicle = SimpleNamespace(speed_m_s=2.0, forward_m_s=2.0, battery=None, position=position)
     run = SimpleNamespace(activity=Activity(RunPhase.DRIVING), stop=None, is_driving=False)
-    status = SimpleNamespace(time_s=100.0 + time_s, pose=None, activity=run.activity, target="gate")
+    status = SimpleNamespace(time_s=100.0 + time_s, pose=None, activity=run.activity, target="gate", decision=None)
     return cast(
         Any,
         SimpleNamespace(
