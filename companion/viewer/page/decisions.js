@@ -15,7 +15,7 @@ export class Decisions {
     this.why = make("div", { class: "why-decision" });
     this.list = make("ol", { class: "decision-list" });
     this.only = make("input", { type: "checkbox", onchange: () => this.filter() });
-    const only = make("label", { class: "decision-filter" }, this.only, "Only where it does not just go on");
+    const only = make("label", { class: "decision-filter" }, this.only, "Hide those that just go on");
     this.node = make("div", { class: "decisions" }, this.why, make("section", {}, this.head, only, this.list));
     setText(this.head, `${record.decisions.length} decisions`);
     this.listed = record.decisions.map((_, i) => i);
@@ -61,8 +61,19 @@ export class Decisions {
       make("p", {}, `${clock(decision.t, scene)} · to ${decision.target || "no target"} · part ${decision.part}`),
       make("p", { class: "reason" }, decision.reason),
       this.candidates(decision.candidates ?? []),
-      make("ul", { class: "lines" }, ...(decision.lines ?? []).map((line) => make("li", {}, line))),
+      this.inWords(decision.lines ?? []),
     ];
+  }
+
+  /** Map, candidates and costs as lines, as `replay --why` prints them; what was opened once stays open. */
+  inWords(lines) {
+    const list = make("ul", { class: "lines" }, ...lines.map((line) => make("li", {}, line)));
+    return make(
+      "details",
+      { open: this.opened ? "" : null, ontoggle: (event) => (this.opened = event.target.open) },
+      make("summary", {}, "In words, and what the cost is made of"),
+      list,
+    );
   }
 
   candidates(candidates) {
