@@ -1,0 +1,37 @@
+"""What went wrong once, kept as campaigns of a few seeded runs: none of it goes wrong again."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from sitl.cli.commands import app
+
+FOUND = Path(__file__).resolve().parents[2] / "missions" / "campaigns" / "found"
+RUNS = {"settings-together": 8, "rough-corner": 3, "round-a-wall": 3}
+UNREACHABLE = ("rough-corner",)
+"""There is no way to the target, and that is to be said."""
+MOST_MEAN_S = {"settings-together": 60.0, "round-a-wall": 270.0}
+"""Round a wall, where the rover turned to and fro, it took 286 s."""
+
+
+def test_every_find_is_driven() -> None:
+    assert {
+        file.stem for file in FOUND.glob("*.toml") if "-mission" not in file.stem and "-world" not in file.stem
+    } == {*RUNS}
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", RUNS)
+def test_it_does_not_go_wrong_again(tmp_path: Path, name: str) -> None:
+    result = CliRunner().invoke(app, ["campaign", str(FOUND / f"{name}.toml"), "--out", str(tmp_path)])
+    assert result.exit_code == 0 and "policies broken: none" in result.output, result.output
+    made = [json.loads(line)["result"] for line in (tmp_path / "runs.jsonl").read_text().splitlines()]
+    assert len(made) == RUNS[name] and sum(one["touched"] for one in made) == 0
+    assert [one["unreachable"] for one in made] == [int(name in UNREACHABLE)] * len(made)
+    assert all(one["reached"] + one["unreachable"] == one["targets"] for one in made)
+    if name in MOST_MEAN_S:
+        assert sum(one["seconds"] for one in made) / len(made) < MOST_MEAN_S[name]
