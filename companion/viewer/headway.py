@@ -55,6 +55,7 @@ class Headway:
         self.rerouted = ""
         """Why it has just taken another way, in words; empty where it has not."""
         self._decision: Decision | None = None
+        self._target = ""
         self._rerouted_s = -math.inf
         self._centres: dict[float, Pose] = {}
         self._made_way_s = -math.inf
@@ -70,10 +71,15 @@ class Headway:
         self._note_decision(status)
 
     def _note_decision(self, status: Status) -> None:
-        """A decision stands until the rover enters the next field; its reason is told for longer."""
+        """A decision stands until the rover enters the next field; its reason is told for longer.
+
+        It is no reason for where the rover goes after a stop, or to another target.
+        """
         decision, before = status.decision, self._decision
         self._decision = decision
-        if decision is not None and decision is not before and decision.reason in REROUTES:
+        if status.target != self._target or status.activity.phase is not RunPhase.DRIVING:
+            self.rerouted, self._target = "", status.target
+        elif decision is not None and decision is not before and decision.reason in REROUTES:
             self.rerouted, self._rerouted_s = str(decision.reason), status.time_s
         elif status.time_s - self._rerouted_s > REROUTED_S:
             self.rerouted = ""

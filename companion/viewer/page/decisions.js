@@ -25,6 +25,8 @@ export class Decisions {
   filter() {
     const all = this.record.decisions.map((_, i) => i);
     this.listed = this.only.checked ? all.filter((i) => !this.record.decisions[i].goes_on) : all;
+    const shown = this.only.checked ? `${this.listed.length} of ${all.length}` : all.length;
+    setText(this.head, `${shown} decisions`);
     this.from = -1;
     this.showList();
   }
@@ -36,11 +38,11 @@ export class Decisions {
 
   /** Goes to the decision before or after a time. */
   step(t, direction) {
-    const { decisionTimes } = this.record;
-    const at = lastNotAbove(decisionTimes, t);
+    const times = this.listed.map((i) => this.record.decisionTimes[i]);
+    const at = lastNotAbove(times, t);
     // In the middle of a decision, back means its beginning, as everywhere where something is played.
-    const back = at >= 0 && t - decisionTimes[at] > 0.05 ? at : at - 1;
-    const wanted = decisionTimes[direction > 0 ? at + 1 : back];
+    const back = at >= 0 && t - times[at] > 0.05 ? at : at - 1;
+    const wanted = times[direction > 0 ? at + 1 : back];
     if (wanted !== undefined) this.jump(wanted);
   }
 
@@ -118,7 +120,8 @@ export class Decisions {
         ...this.more(listed.length - from - this.rows.length, "later", from + this.rows.length),
       );
     }
-    this.rows.forEach((row, i) => setAttribute(row, "aria-current", from + i === current ? "true" : null));
+    const inForce = listed[current] === this.current; // not one that is hidden
+    this.rows.forEach((row, i) => setAttribute(row, "aria-current", inForce && from + i === current ? "true" : null));
     const row = this.rows[current - from];
     this.list.scrollTop = row ? row.offsetTop - this.list.offsetTop - this.list.clientHeight / 2 : 0;
   }

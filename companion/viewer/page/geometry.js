@@ -56,9 +56,27 @@ export function between(a, b, share) {
 /** A path that ends farther from the goal leads somewhere else first: back, to look for another way. */
 const AT_GOAL_M = 3;
 
+/** The rover may have passed so much of a path: a record keeps it for a second or so while the rover drives on. */
+const PASSED_M = 5;
+
+/** The places of the path that lie ahead of the rover. */
+export function pathAhead({ pose, path }) {
+  if (!pose || !path?.length) return path ?? [];
+  let [nearest, at, along] = [Infinity, 0, 0];
+  for (let i = 0; i < path.length && along <= PASSED_M; i += 1) {
+    const far = distance(pose, path[i]);
+    if (far < nearest) [nearest, at] = [far, i];
+    along += distance(path[i], path[i + 1] ?? path[i]);
+  }
+  const [here, next] = [path[at], path[at + 1]];
+  if (!next) return path.slice(at);
+  const passed = (pose[0] - here[0]) * (next[0] - here[0]) + (pose[1] - here[1]) * (next[1] - here[1]) > 0;
+  return path.slice(passed ? at + 1 : at);
+}
+
 /** Metres along the path that are left to the goal; NaN without a path that leads there. */
 export function wayLeft(frame) {
   const { pose, path, goal } = frame ?? {};
   if (!pose || !goal || !path?.length || distance(path.at(-1), goal.place) > AT_GOAL_M) return NaN;
-  return length([pose, ...path]);
+  return length([pose, ...pathAhead(frame)]);
 }

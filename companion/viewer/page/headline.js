@@ -94,7 +94,7 @@ function onTheWay(frame) {
   if (!frame.goal || !frame.pose) return "";
   const rest = wayLeft(frame);
   const way = Number.isFinite(rest)
-    ? `${metres(rest)} to go along the path`
+    ? `${metres(rest)} to go`
     : `${metres(distance(frame.pose, frame.goal.place))} straight`;
   const turning = turningOnTheSpot(frame);
   return turning ? `${turning} · ${way}` : `${way} · ${number(Math.abs(frame.speed ?? NaN))} m/s`;

@@ -1,6 +1,6 @@
 // The rover and what it does now: rays, rest of the path, motion, setpoint; and what moves around it.
 
-import { placed } from "viewer/geometry.js";
+import { pathAhead, placed } from "viewer/geometry.js";
 
 /** The rover is never drawn smaller than this, however far away the map is seen from. */
 const SMALLEST_ROVER_PX = 26;
@@ -41,7 +41,7 @@ export function drawRays(pen, frame) {
 /** What lies ahead: the path to the goal, and above it the motion that is planned in detail. */
 export function drawAhead(pen, frame) {
   const { colours } = pen;
-  const path = frame.path ?? [];
+  const path = pathAhead(frame);
   const start = frame.pose && path.length ? [frame.pose.slice(0, 2)] : [];
   pen.line([...start, ...path], { colour: colours.path, width: 4, dash: [10, 5], casing: 3 });
   pen.line(frame.motion ?? [], { colour: colours.motion, width: 3.5, casing: 2 });

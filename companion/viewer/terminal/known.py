@@ -93,7 +93,7 @@ def mission_section(companion: Companion, status: Status) -> Section:
         Fact("target", f"{status.target or '-'}{far}"),
         Fact("reached", f"{status.targets_reached} of {status.targets}"),
         Fact("part", f"{decision.part.value}, {PARTS[decision.part]}" if decision else "-"),
-        Fact("why", decision.reason if decision else "-"),
+        Fact("decided", decision.reason if decision else "-"),
         Fact("steps", f"{status.steps}, {searches} searches", minor=True),
     )
     return Section("Mission", facts)

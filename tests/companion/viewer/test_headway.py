@@ -7,6 +7,8 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, cast
 
+import pytest
+
 from companion.core.frames import Pose
 from companion.navigation.field_step import DecisionReason
 from companion.safety.reasons import Activity, RunPhase
@@ -69,6 +71,25 @@ def test_one_that_is_not_to_drive_is_not_held_up() -> None:
     assert watched(20.0, lambda _: 0.0, phase=RunPhase.WAY_BLOCKED) == []
 
 
+def moment(time_s: float, decision: Any, target: str = "gate", phase: RunPhase = RunPhase.DRIVING) -> Any:
+    return SimpleNamespace(time_s=time_s, pose=None, activity=Activity(phase), decision=decision, target=target)
+
+
+@pytest.mark.parametrize("changed", [{"target": "shed"}, {"phase": RunPhase.STOPPED}])
+def test_why_it_took_another_way_is_not_why_it_goes_elsewhere_or_on_after_a_stop(changed: dict[str, Any]) -> None:
+    better, following = (
+        SimpleNamespace(reason=reason) for reason in (DecisionReason.BETTER_PATH, DecisionReason.FOLLOWING)
+    )
+    headway, companion = Headway(), cast(Any, SimpleNamespace(driver=None))
+    headway.note(companion, moment(0.0, following))
+    headway.note(companion, moment(0.1, better))
+    assert headway.rerouted == "a better path"
+    headway.note(companion, moment(0.2, following, **changed))
+    assert headway.rerouted == ""
+    headway.note(companion, moment(0.3, following))
+    assert headway.rerouted == ""
+
+
 def test_why_it_took_another_way_is_told_for_some_seconds() -> None:
     following, blocked = (
         SimpleNamespace(reason=reason) for reason in (DecisionReason.FOLLOWING, DecisionReason.PATH_BLOCKED)
@@ -77,7 +98,7 @@ def test_why_it_took_another_way_is_told_for_some_seconds() -> None:
     for tick in range(120):
         time_s = tick * STEP_S
         decision = blocked if 30 <= tick < 35 else following
-        status = SimpleNamespace(time_s=time_s, pose=None, activity=Activity(RunPhase.DRIVING), decision=decision)
+        status = moment(time_s, decision)
         headway.note(cast(Any, SimpleNamespace(driver=None)), cast(Any, status))
         told.append(headway.rerouted)
     assert told[29] == "" and set(told[30:80]) == {"current path blocked: new path"} and set(told[82:]) == {""}

@@ -362,10 +362,37 @@ list.only.onchange();
 const rows = list.list.children;
 const current = rows.filter((row) => row.attributes["aria-current"]).map((row) => row.textContent);
 rows[3].children[0].onclick();
-const few = rows.length;
+const [few, head, jumped] = [rows.length, list.head.textContent, to];
+list.step(150, -1);
+const before = to;
+list.step(150, 1);
+const after = to;
+list.show(160);
+const chosen = list.list.children.filter((row) => row.attributes["aria-current"]).map((row) => row.textContent);
 list.only.checked = false;
 list.only.onchange();
-tell([few, current, to, list.list.children.length]);
+tell([few, head, current, jumped, before, after, chosen, list.list.children.length, list.head.textContent]);
 """
-    few, current, to, all_rows = ran(tmp_path, DOCUMENT + script)
-    assert (few, to, all_rows) == (20, 60, 122) and len(current) == 1 and "141" in current[0]
+    few, head, current, jumped, before, after, chosen, rows, whole = ran(tmp_path, DOCUMENT + script)
+    assert (few, head, rows, whole) == (20, "20 of 400 decisions", 122, "400 decisions")
+    assert current == [], "the one in force is hidden"
+    assert (jumped, before, after) == (60, 140, 160) and len(chosen) == 1 and "161" in chosen[0]
+
+
+def test_what_is_left_of_a_path_that_is_a_second_old_is_counted_from_where_the_rover_is(tmp_path: Path) -> None:
+    script = """
+const { pathAhead, wayLeft } = await import("./geometry.js");
+const path = Array.from({ length: 41 }, (_, i) => [0, 0.5 * i]);
+const goal = { place: [0, 20] };
+const at = (east, north = 0) => ({ pose: [north, east, 0], path, goal });
+const back = [...path, ...path.map(([, e]) => [1, 20 - e])]; // and back beside itself
+tell([
+  [0, 0.2, 1.1, 2.4].map((east) => wayLeft(at(east))),
+  wayLeft({ pose: [0.6, 2, 0], path: back, goal: { place: [1, 0] } }),
+  pathAhead({ pose: [0, 20, 0], path }).length, pathAhead({ path }).length, pathAhead({ pose: [0, 0, 0] }),
+]);
+"""
+    left, beside, at_end, without_pose, without_path = ran(tmp_path, DOCUMENT + script)
+    assert left == pytest.approx([20.0, 19.8, 18.9, 17.6], abs=0.01)
+    assert beside == pytest.approx(39.0, abs=0.5), "the near part of the path counts, not a later one"
+    assert (at_end, without_pose, without_path) == (1, 41, [])
