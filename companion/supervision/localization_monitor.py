@@ -37,7 +37,7 @@ WANDERINGS, WANDERINGS_S = 3, 20.0
 ONCE_S = 3.0
 """Wandering that goes on within this time of the last is counted once."""
 CALM_S = 10.0
-"""How long after the last wandering the rover must not drive."""
+"""How long after the last wandering the rover must not drive; after steps with the fix it stands so long."""
 
 
 class LocalizationMonitor(Monitor):
@@ -57,7 +57,8 @@ class LocalizationMonitor(Monitor):
         self._asked_s = -math.inf
         self._home_told = False
         self._wandered_s: deque[float] = deque(maxlen=WANDERINGS)
-        self._unsure_until_s = -math.inf
+        self._stepped_s: deque[float] = deque(maxlen=WANDERINGS)
+        self._unsure_until_s = self._steps_until_s = -math.inf
         self._fix = FixJump()
 
     @property
@@ -69,6 +70,8 @@ class LocalizationMonitor(Monitor):
         """Why the rover must not move now; None when it may."""
         if now_s < self._unsure_until_s:
             return Reason(Doubt.POSITION_WANDERS)
+        if self._doubt is None and now_s < self._steps_until_s:
+            return Reason(Doubt.FIX_CHANGED)
         return None if self._doubt is None else Reason(self._doubt)
 
     def tick(self, now_s: float) -> None:
@@ -121,12 +124,18 @@ class LocalizationMonitor(Monitor):
         elif fix.phase is JumpPhase.STEPPING:
             self._doubt, self._doubt_s = Doubt.FIX_CHANGED, now_s
         elif fix.phase is JumpPhase.SETTLED:
-            self._count_wandering(now_s)  # a fix that comes and goes is no better than a position that wanders
-            text = f"GPS {fix.before.text} to {fix.after.text}: the map is moved by {fix.off_m:.2f} m"
-            self._notifier.tell(text, Severity.WARNING)
+            self._count_step(now_s)
+            change = f"{fix.before.text} to {fix.after.text}" if fix.before != fix.after else f"{fix.after.text} again"
+            self._notifier.tell(f"GPS {change}: the map is moved by {fix.off_m:.2f} m", Severity.WARNING)
             executor.move_map(fix.north_m, fix.east_m, now_s)
             self._doubt = None
             self._run.start_afresh()
+
+    def _count_step(self, now_s: float) -> None:
+        """A fix that comes and goes moves the map again and again: the rover stands until it has stayed for a while."""
+        self._stepped_s.append(now_s)
+        if len(self._stepped_s) == WANDERINGS and now_s - self._stepped_s[0] <= WANDERINGS_S:
+            self._steps_until_s = now_s + CALM_S
 
     def _count_wandering(self, now_s: float) -> None:
         """Once in a while the map begins anew; again and again, nothing that is mapped is true for long."""

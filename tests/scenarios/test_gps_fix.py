@@ -14,6 +14,7 @@ from companion.recording.reader import load_record
 from companion.replay.replay import replay
 from companion.safety.reasons import Doubt, RunPhase, WaitReason
 from companion.settings import Settings, parse_settings
+from companion.supervision.localization_monitor import CALM_S
 from sitl.faults.plan import Fault, FixName, GpsFixChange, GpsFixUntold
 from tests.support.quick import first_of
 from tests.support.records import recorded
@@ -218,6 +219,19 @@ def test_with_the_gate_it_stands_while_the_fix_is_poor_and_the_map_follows_both_
     rig.finish()
     assert rig.gave(Doubt.GPS_POOR) and len(moves(rig)) == 2 and misplaced(rig) < WRONG
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+@first_of(1, "settings", [GATED, None])
+def test_a_fix_that_comes_and_goes_is_waited_out(tmp_path: Path, settings: Settings | None) -> None:
+    """It stands for a while after the third step, and goes on without a person."""
+    faults = (fix_fault(0.5, start_s=1.0, duration_s=3.0), fix_fault(0.5, start_s=8.0, duration_s=3.0))
+    rig = stepped(tmp_path, *faults, settings=settings)
+    since_s = rig.now_s()
+    rig.finish()
+    assert len(moves(rig)) >= 3 and rig.now_s() - since_s > CALM_S
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+    assert HOLD not in modes_asked_for(rig, since_s)[:-1], "only at the end"
+    assert not rig.gave(Doubt.POSITION_WANDERS)
 
 
 @pytest.mark.thorough
