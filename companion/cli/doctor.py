@@ -15,7 +15,8 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.checkpoint.state_directory import default_directory, last_estimate
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
+from companion.cli.given import RadiusM, ResolutionM, SpeedMS
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, SkipUnknown, usable_settings
 from companion.cli.lidars import LidarOption, lidars_given
 from companion.cli.state import StateFiles
 from companion.control.model_estimate import ModelEstimate, described
@@ -39,6 +40,7 @@ from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import ByteLink, LinkError, device_of, open_link
 from companion.mission.doubtful_places import doubtful_places
 from companion.mission.field_size import field_size, finer_evidence, sure_gap_m
+from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
 from companion.mission.resolve import resolve
@@ -50,7 +52,7 @@ STEP_S = 0.05
 LISTEN_S = 4.0
 """So long at least to lidars."""
 EXIT_FINE, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 3, 4
-MISSION_FINDINGS = ("mission", "far-target", "payload")
+MISSION_FINDINGS = ("mission", "mission-items", "far-target", "payload")
 COLOURS = {Level.STOP: "red", Level.WARN: "yellow", Level.NOTE: "cyan"}
 
 
@@ -61,6 +63,10 @@ def doctor(
         typer.Argument(metavar="MISSION", help="A mission to be looked at where the rover is.", show_default=False),
     ] = None,
     seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Listen no longer than this.")] = 15.0,
+    resolution_m: ResolutionM = None,
+    radius_m: RadiusM = None,
+    speed_m_s: SpeedMS = None,
+    skip_unknown: SkipUnknown = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
     lidar: LidarOption = None,
@@ -74,9 +80,9 @@ def doctor(
         files = StateFiles(state)
         settings = usable_settings(settings_file)
         signer = files.signer(signing_key)
-        mission = None
+        mission, left_out = None, list[Finding]()
         if mission_file is not None:
-            mission = load_mission(mission_file, simulated=False, skip_unknown=True)
+            mission, left_out = _looked_at(mission_file, Given(resolution_m, radius_m, speed_m_s), skip=skip_unknown)
         commands, clock, specs = commands_of(mission), WallClock(), lidars_given(lidar, connect)
         link, wired = _opened(connect, specs, clock)
     except (SettingsError, LinkError, MissionError, OutputError, SigningKeyError, LidarError) as error:
@@ -100,6 +106,7 @@ def doctor(
         *lidar_findings(heard, others_look_ahead=seen.vehicle.scan_ahead is not None),
         *_diagnosed(seen, settings, device_of(connect)),
         *payload(seen, commands),
+        *left_out,
         *([] if mission is None else of_mission(mission, seen, settings)),
         *kernels(cold=not kernels_warm(settings)),
     ]
@@ -123,6 +130,17 @@ def _diagnosed(seen: Survey, settings: Settings, device: str | None) -> list[Fin
     findings = diagnose(seen, settings.safety.gps_fix)
     swapped = list(findings_of_port(seen.place, seen.strange, partial(listened, device) if device else None))
     return [*swapped, *(one for one in findings if not (swapped and one.name in INSTEAD_OF))]
+
+
+def _looked_at(file: Path, given: Given, *, skip: bool) -> tuple[Mission, list[Finding]]:
+    """The mission without what no rover can do, and what that is where a run would refuse it. Raises MissionError."""
+    mission = with_given(load_mission(file, simulated=False, skip_unknown=True), given)
+    try:
+        load_mission(file, simulated=False, skip_unknown=skip)
+    except MissionError as error:
+        remedy = "a mission without them, or --skip-unknown to drive the rest"
+        return mission, [Finding("mission-items", Level.STOP, f"{error}.", remedy)]
+    return mission, []
 
 
 def commands_of(mission: Mission | None) -> list[Command]:

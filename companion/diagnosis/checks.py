@@ -14,7 +14,7 @@ from companion.vehicle.motion_limits import CRUISE_M_S, LIMITS, THROTTLE_SCALE, 
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
 from companion.vehicle.survey import Survey
-from companion.vehicle.wanted_parameters import S_CURVES
+from companion.vehicle.wanted_parameters import S_CURVES, wanted_parameters
 
 FIRMWARE = (4, 7)
 """The version of ArduRover that this was written for and measured with."""
@@ -38,6 +38,7 @@ STICKS = {"RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0}
 """The channels that the companion reads."""
 STATIONS = ("MAV_GCS_SYSID", "SYSID_MYGCS")
 """The same parameter in 4.7 and in older versions."""
+FAILSAFES = {"FS_ACTION": "A failsafe", "FS_EKF_ACTION": "A lost position"}
 PARAMETERS = (
     "OA_TYPE",
     "AVOID_ENABLE",
@@ -48,6 +49,7 @@ PARAMETERS = (
     "PRX1_TYPE",
     "RNGFND1_TYPE",
     "FS_GCS_ENABLE",
+    *FAILSAFES,
     "FENCE_ENABLE",
     *dict.fromkeys((*LIMITS, *THROTTLE_SCALE)),
     *STICKS,
@@ -356,6 +358,10 @@ def guided(seen: Survey) -> Iterator[Finding]:
         says = f"The rover begins and ends its way to a target {how}; the companion was tried with {wanted_m_s3:g}."
         yield to_set("wp-jerk", Level.NOTE, says, "WP_JERK", jerk_m_s3, wanted_m_s3)
     yield from throttle(seen)
+    for one in wanted_parameters(0.0):
+        if one.name in FAILSAFES and not one.accepts(action := seen.parameters.get(one.name, one.value)):
+            says = f"{FAILSAFES[one.name]} ends otherwise than in HOLD: it may drive through whatever is in the way."
+            yield to_set("failsafe-action", Level.WARN, says, one.name, action, one.value)
     if seen.parameters.get("WP_SPEED") == 0.0:
         yield to_set("wp-speed", Level.WARN, "Guided speed is left to CRUISE_SPEED.", "WP_SPEED", 0.0, 2.0)
 

@@ -72,9 +72,12 @@ def parsed(text: str, port: str = "") -> LidarSpec:
         raise LidarError(f"lidar '{text}': names no port; write {FORM}")
     if "=" in port:
         raise LidarError(f"lidar '{text}': one colon stands before all options, and commas between them: {FORM}")
-    mounting = Mounting(model.min_m, model.max_m)
+    mounting, given = Mounting(model.min_m, model.max_m), set[str]()
     for option in filter(None, options.split(",")):
-        mounting = _with_option(mounting, option, model, text)
+        mounting, key = _with_option(mounting, option, model, text), option.partition("=")[0]
+        if key in given and key != "mask":
+            raise LidarError(f"lidar '{text}': {key} is given twice; once is enough")
+        given.add(key)
     if mounting.min_m >= mounting.max_m:
         limits = f"min={mounting.min_m:g} is not below max={mounting.max_m:g}"
         raise LidarError(f"lidar '{text}': {limits}; the {model.name} sees from {model.min_m:g} to {model.max_m:g} m")
@@ -82,9 +85,10 @@ def parsed(text: str, port: str = "") -> LidarSpec:
 
 
 def _split(rest: str) -> tuple[str, str]:
-    """Port and options. Ports below /dev/serial/by-path have colons of their own, but no equals sign in the end."""
+    """Port and options. Ports below /dev/serial/by-path have colons of their own; they end with numbers."""
     port, colon, options = rest.rpartition(":")
-    if colon and ("=" in options or options in ("", "flip") or options.startswith("flip,")):
+    is_words = not any(one.isdigit() for one in options)  # also of an option that is none, which is refused then
+    if colon and (is_words or "=" in options or " " in options or options.startswith("flip,")):
         return port, options
     return rest, ""
 

@@ -16,7 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
-from companion.cli.doctor import mission_line, of_mission
+from companion.cli.doctor import _looked_at, mission_line, of_mission
 from companion.control.following import Following
 from companion.control.model_estimate import ModelEstimate
 from companion.core.frames import LocalFrame, NedPoint
@@ -25,6 +25,7 @@ from companion.diagnosis.finding import Level
 from companion.mavlink.byte_link import MemoryLink
 from companion.mavlink.signing import Signer
 from companion.mavlink.surveyor import Surveyor
+from companion.mission.given import Given
 from companion.mission.load import load_mission
 from companion.settings import Settings
 from sitl.scenario import scenario_from_mission
@@ -143,6 +144,8 @@ S, W, N = Level.STOP, Level.WARN, Level.NOTE
         ({"FS_GCS_ENABLE": 1}, "gcs-failsafe", W),
         ({"FS_GCS_ENABLE": 1, "MAV_GCS_SYSID": 1}, "system-ids", S),
         ({"FENCE_ENABLE": 1}, "fence", N),
+        ({"FS_ACTION": 1}, "failsafe-action", W),
+        ({"FS_EKF_ACTION": 0}, "failsafe-action", W),
     ],
 )  # fmt: skip
 def test_a_parameter_that_is_set_wrong(tmp_path: Path, values: dict[str, float], finding: str, level: Level) -> None:
@@ -375,3 +378,18 @@ def test_a_mission_is_looked_at_from_where_the_rovers_home_is(tmp_path: Path) ->
         assert line == f"mission m: 1 target; {is_so}"
         assert [(one.name, one.level) for one in findings] == found
         assert all("\n" not in one.says and one.remedy for one in findings)
+
+
+def test_what_run_would_refuse_of_a_mission_is_found_and_options_are_those_of_run(tmp_path: Path) -> None:
+    file = tmp_path / "m.waypoints"
+    home, place, camera = (
+        "0\t1\t0\t16\t0\t0\t0\t0\t53.1325\t23.1688\t0\t1",
+        "1\t0\t3\t16\t0\t0\t0\t0\t53.1326\t23.1689\t0\t1",
+        "2\t0\t3\t530\t0\t0\t0\t0\t0\t0\t0\t1",
+    )
+    file.write_text("\n".join(("QGC WPL 110", home, place, camera, "")))
+    mission, found = _looked_at(file, Given(radius_m=0.6), skip=False)
+    assert mission.rover.radius_m == 0.6 and len(mission.targets) == 1
+    (one,) = found
+    assert (one.name, one.level) == ("mission-items", S) and "530" in one.says and "--skip-unknown" in one.remedy
+    assert _looked_at(file, Given(), skip=True)[1] == []

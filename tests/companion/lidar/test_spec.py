@@ -52,6 +52,10 @@ def test_ports_with_colons_of_their_own(text: str, port: str) -> None:
         ("LD19:/dev/x,yaw=90", "one colon stands before all options, and commas between them"),
         ("LD19:/dev/x:yaw=90:flip", "one colon stands before all options"),
         ("LD19:/dev/x:flip=maybe", "'flip=maybe' is no option"),
+        ("LD19:/dev/ttyUSB9:inverted", "'inverted' is no option"),
+        ("LD19:/dev/x:FLIP", "'FLIP' is no option"),
+        ("LD19:/dev/x:yaw 3", "'yaw 3' is no option"),
+        ("LD19:/dev/x:yaw=10,yaw=20", "yaw is given twice"),
     ],
 )
 def test_what_is_wrong_is_told_in_one_line(text: str, says: str) -> None:

@@ -50,5 +50,5 @@ def test_guard_and_station_add_theirs() -> None:
 
 
 def test_the_doctor_looks_at_what_would_stop_a_mission() -> None:
-    asked_for_no_finding = {"FS_ACTION", "FS_EKF_ACTION", "SCR_ENABLE", "SCR_USER1"}
+    asked_for_no_finding = {"SCR_ENABLE", "SCR_USER1"}
     assert set(TABLE) - asked_for_no_finding <= set(PARAMETERS)
