@@ -11,11 +11,11 @@ from typer.testing import CliRunner
 from sitl.cli.commands import app
 
 FOUND = Path(__file__).resolve().parents[2] / "missions" / "campaigns" / "found"
-RUNS = {"settings-together": 8, "rough-corner": 3, "round-a-wall": 3}
+RUNS = {"settings-together": 8, "rough-corner": 3}
 UNREACHABLE = ("rough-corner",)
 """There is no way to the target, and that is to be said."""
-MOST_MEAN_S = {"settings-together": 60.0, "round-a-wall": 270.0}
-"""Round a wall, where the rover turned to and fro, it took 286 s."""
+MOST_S = {"settings-together": 120.0, "rough-corner": 300.0}
+"""Of a run: at the rough corner the rover went to and fro for minutes."""
 
 
 def test_every_find_is_driven() -> None:
@@ -33,5 +33,4 @@ def test_it_does_not_go_wrong_again(tmp_path: Path, name: str) -> None:
     assert len(made) == RUNS[name] and sum(one["touched"] for one in made) == 0
     assert [one["unreachable"] for one in made] == [int(name in UNREACHABLE)] * len(made)
     assert all(one["reached"] + one["unreachable"] == one["targets"] for one in made)
-    if name in MOST_MEAN_S:
-        assert sum(one["seconds"] for one in made) / len(made) < MOST_MEAN_S[name]
+    assert max(one["seconds"] for one in made) < MOST_S[name]
