@@ -138,8 +138,7 @@ def _looked_at(file: Path, given: Given, *, skip: bool) -> tuple[Mission, list[F
     try:
         load_mission(file, simulated=False, skip_unknown=skip)
     except MissionError as error:
-        remedy = "a mission without them, or --skip-unknown to drive the rest"
-        return mission, [Finding("mission-items", Level.STOP, f"{error}.", remedy)]
+        return mission, [Finding("mission-items", Level.STOP, f"{error}.", "a mission without them")]
     return mission, []
 
 
@@ -278,7 +277,7 @@ def _show(
         table.add_row(f"[{COLOURS[one.level]}]{one.level}[/]", _plain(f"{one.says}{value}"), _plain(one.remedy))
     if findings:
         console.print(table)
-    if any(one.wanted is not None for one in findings):
+    if any(one.wanted is not None and one.level is not Level.NOTE for one in findings):
         console.print("`rover-companion params --write FILE` writes a file with all parameters that should be set")
     stopping = sum(one.level is Level.STOP for one in findings)
     console.print(f"{stopping} would stop a mission" if stopping else "nothing found that would stop a mission")

@@ -197,7 +197,7 @@ def _maps(mission: Mission, world: SimulatedWorld | None) -> list[str]:
         known = load_map(mission.prior_map, mission.grid.resolution_m)
         lines.append(f"known map: {mission.prior_map}: {_map_text(known)}")
     if world is not None:
-        unknown = "a world file; what it describes only rover-sitl checks"
+        unknown = "a world file; only rover-sitl checks all of it"
         lines.append(f"simulator's world: {world.path}: {unknown if world.grid is None else _map_text(world.grid)}")
     return lines
 

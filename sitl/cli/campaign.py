@@ -24,6 +24,7 @@ from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
+from sitl.cli.extras import statistics_fault
 from sitl.cli.runs import FILE, alone_in, check_all, number_of, progress, warm_up_all
 from sitl.cli.search import search_campaign
 from sitl.generators.made_ground import NoWayError
@@ -87,6 +88,8 @@ def drive_campaign(
     file: Path, out: Path | None, jobs: int, cluster: str | None = None, *, parquet: bool = False
 ) -> Runs:
     """Drive what is left of a campaign and put everything out. Raises one of ``BAD_INPUT``."""
+    if fault := statistics_fault("campaign"):
+        raise CampaignError(fault)
     console = Console()
     table, folder = load_campaign(file), file.resolve().parent
     place = out or Path("out") / table.name

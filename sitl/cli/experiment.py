@@ -15,6 +15,7 @@ from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, replaced, writable
 from companion.mapping.map_files import MapError
 from companion.settings import Settings
 from companion.settings.versions import made_with
+from sitl.cli.extras import statistics_fault
 from sitl.experiments.experiment import OFF_MODEL, Checked, Experiment, ExperimentError, ExperimentReport, Options
 
 EXPERIMENTS = (
@@ -42,6 +43,7 @@ WITH_CONTROLLERS = ("barn", "controllers", "dead-companion", "gates", "killed-co
 WITH_MISMATCH = ("barn", "controllers", "dead-companion", "gates", "killed-companion", "missions")
 WITH_LATE = ("barn", "controllers", "gates", "killed-companion", "missions")
 DRIVES = ("barn", "controllers", "dead-companion", "driving", "gates", "killed-companion", "missions", "traffic")
+WITH_STATISTICS = ("barn", "gates", "killed-companion", "wang-table4")
 WITH_GUARD = ("dead-companion", "killed-companion", "missions")
 EXIT_FAILED = 3
 LINES = 10
@@ -130,6 +132,8 @@ def experiment(
     try:
         if name not in EXPERIMENTS:
             raise ExperimentError(f"experiment {name}: unknown; known are {', '.join(EXPERIMENTS)}")
+        if name in WITH_STATISTICS and (fault := statistics_fault(f"experiment {name}")):
+            raise ExperimentError(fault)
         # Report a file that cannot be written before the work, not after it.
         writable(json_file)
         writable(docs and docs / "results.md")

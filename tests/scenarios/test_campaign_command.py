@@ -181,3 +181,20 @@ def test_a_search_without_the_optimiser_is_one_line(campaign: Path, monkeypatch:
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 2
     assert result.output.splitlines()[-1] == "--search: cma is not installed; install rover-companion[search]"
+
+
+@pytest.mark.parametrize("command", ["campaign", "compare", "experiment gates"])
+def test_without_the_library_of_its_statistics_nothing_is_driven(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    """The table came after hours of drives, and ended in a traceback."""
+    monkeypatch.setitem(sys.modules, "scipy", None)
+    monkeypatch.chdir(campaign.parent)
+    given = {
+        "campaign": [str(campaign)],
+        "compare": ["clutter", "--planners", "hybrid,theta-star", "--seeds", "1"],
+        "experiment gates": ["--runs", "1"],
+    }
+    result = CliRunner().invoke(app, [*command.split(), *given[command]])
+    assert result.exit_code == 2 and not list(campaign.parent.rglob("runs.jsonl")), result.output
+    assert result.output.splitlines()[-1].endswith("its statistics need scipy; install rover-companion[experiments]")

@@ -391,5 +391,5 @@ def test_what_run_would_refuse_of_a_mission_is_found_and_options_are_those_of_ru
     mission, found = _looked_at(file, Given(radius_m=0.6), skip=False)
     assert mission.rover.radius_m == 0.6 and len(mission.targets) == 1
     (one,) = found
-    assert (one.name, one.level) == ("mission-items", S) and "530" in one.says and "--skip-unknown" in one.remedy
+    assert (one.name, one.level) == ("mission-items", S) and "530" in one.says and "--skip-unknown" in one.says
     assert _looked_at(file, Given(), skip=True)[1] == []
