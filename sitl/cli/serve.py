@@ -193,7 +193,7 @@ def _fed(
     targets: list[dict[str, object]],
 ) -> WebFeed:
     """The feed of the page, which is told of events from now on."""
-    how = f"it listens on {', '.join(listen)}" if listen else HOW_TO_CONNECT
+    how = f"its links: {', '.join(listen)}" if listen else HOW_TO_CONNECT
     told.feed = WebFeed(simulator, page, name, how, lambda line: typer.echo(line, err=True), targets)
     return told.feed
 
