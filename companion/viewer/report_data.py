@@ -201,6 +201,8 @@ class ReportWatch(ReplayObserver):
         if executor is None or pose is None:
             return
         whole = companion.done
+        if self._evidence is None and not executor.evidence.log_odds.any():
+            return  # the first picture of the map is whole: not before there is something on it
         if executor.evidence is not self._evidence:
             self._evidence, self._watch, whole = executor.evidence, TileWatch(executor.evidence), True
             self.scene = self._steady.scene(scene_of(self._mission, companion.mission_run, 1))
