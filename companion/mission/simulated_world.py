@@ -47,10 +47,11 @@ def world_of(mission: Mission) -> SimulatedWorld | None:
     path, field_m, rover = sitl.world, sitl.resolution_m or mission.grid.resolution_m, mission.rover.footprint
     if path.suffix.lower() == ".toml":
         content = read_toml(path, MissionError)
-        size = content.get("size_m")
-        size_m = (float(size[0]), float(size[1])) if isinstance(size, list) and len(size) == len(("e", "n")) else None
         return SimulatedWorld(
-            path, field_m, size_m, lambda at: touches_obstacle(path, content, rover, (at.north_m, at.east_m))
+            path,
+            field_m,
+            _size_m(content.get("size_m")),
+            lambda at: touches_obstacle(path, content, rover, (at.north_m, at.east_m)),
         )
     grid = load_map(path, field_m)
     side_m = grid.resolution_m
@@ -60,6 +61,14 @@ def world_of(mission: Mission) -> SimulatedWorld | None:
         return grid.contains(cell) and grid.is_obstacle(cell)
 
     return SimulatedWorld(path, side_m, (grid.width * side_m, grid.height * side_m), stands_at, grid)
+
+
+def _size_m(value: object) -> tuple[float, float] | None:
+    """East and north; None for what the simulator would refuse: that is left to it."""
+    match value:
+        case [int() | float() as east_m, int() | float() as north_m]:
+            return float(east_m), float(north_m)
+    return None
 
 
 def check_start(mission: Mission, world: SimulatedWorld) -> None:

@@ -256,3 +256,12 @@ def test_it_warns_of_targets_in_walls_and_outside_the_simulators_world(tmp_path:
         "warning: target 'far' lies outside",
         "warning: target 'south' lies outside",
     ]
+
+
+@pytest.mark.parametrize("size", ['["a", 20]', "[30]", '"wide"', "[[30], 20]"])
+def test_a_size_of_the_world_that_is_none_is_left_to_the_simulator(tmp_path: Path, size: str) -> None:
+    (tmp_path / "w.toml").write_text(f"size_m = {size}\n")
+    path = tmp_path / "m.toml"
+    path.write_text('[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.toml"\nstart = [3, 3]\n')
+    result = CliRunner().invoke(app, ["mission", "check", str(path)])
+    assert result.exit_code == 0, result.output

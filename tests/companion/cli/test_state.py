@@ -52,23 +52,17 @@ def test_a_place_that_cannot_be_used_is_refused_only_where_it_was_asked_for(
     assert keeping.checkpointer is None and len(said) == 1 and said[0].endswith("this run cannot be resumed")
 
 
-def test_a_run_that_never_began_leaves_the_older_state_alone(tmp_path: Path) -> None:
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_run_that_never_began_leaves_the_older_state_alone(tmp_path: Path, resume: bool) -> None:
+    """And there is something to go on with only for who has resumed it."""
     mission = yard(tmp_path)
     leave_state(tmp_path, mission).close()
-    keeping = RunState(mission, tmp_path / "state", resume=False, say=print)
+    keeping = RunState(mission, tmp_path / "state", resume=resume, say=print)
     keeping.start()
     keeping.close()
-    assert keeping.previous is None and keeping.way_on == ""
+    assert (keeping.previous is not None) is resume
+    assert keeping.way_on.endswith("the same command with --resume") is resume
     assert sorted(path.name for path in (tmp_path / "state").iterdir()) == ["lock", "mission.state"]
-
-
-def test_what_is_resumed_can_be_resumed_again(tmp_path: Path) -> None:
-    mission = yard(tmp_path)
-    leave_state(tmp_path, mission).close()
-    keeping = RunState(mission, tmp_path / "state", resume=True, say=print)
-    keeping.start()
-    keeping.close()
-    assert keeping.way_on.endswith("the same command with --resume")
 
 
 def test_a_state_file_keeps_the_older_state_when_the_first_rows_come(tmp_path: Path) -> None:
