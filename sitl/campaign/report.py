@@ -24,7 +24,12 @@ STYLE = """
 :root { color-scheme: light dark; --line: #8886; --soft: #8882; }
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 75rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
-.scroll { overflow-x: auto; }
+/* A shadow at an edge behind which the table goes on: what covers it scrolls along with the table. */
+.scroll { overflow-x: auto; background:
+  linear-gradient(to right, Canvas 50%, transparent) 0 / 3rem 100% no-repeat local,
+  linear-gradient(to left, Canvas 50%, transparent) 100% / 3rem 100% no-repeat local,
+  linear-gradient(to right, #888a, transparent) 0 / 1rem 100% no-repeat scroll,
+  linear-gradient(to left, #888a, transparent) 100% / 1rem 100% no-repeat scroll; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 th { background: var(--soft); vertical-align: bottom; } th.text, td.text { text-align: left; }
