@@ -15,6 +15,7 @@ from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.pictures import times
 from sitl.cli.campaign import BAD_INPUT, drive_campaign
+from sitl.cli.named import names_in
 from sitl.experiments import drawing
 
 FILE, PLOT = "campaign.toml", "times.png"
@@ -64,7 +65,7 @@ def _check(missions: list[Path], planners: str, controllers: str) -> None:
         if mission.suffix and not mission.is_file():
             raise CampaignError(f"{mission}: no such mission file")
     for option, listed in (("--planners", planners), ("--controllers", controllers)):
-        if not _names(listed):
+        if not names_in(listed):
             raise CampaignError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
 
 
@@ -79,10 +80,6 @@ def _load(file: Path) -> None:
 def _campaign(missions: list[Path], folder: Path, planners: str, controllers: str, seeds: int) -> str:
     """The campaign's file in a folder; a list of strings is written alike in JSON and TOML."""
     worlds = [os.path.relpath(one, folder) if one.suffix else str(one) for one in missions]
-    lists = {"worlds": worlds, "planners": _names(planners), "controllers": _names(controllers)}
+    lists = {"worlds": worlds, "planners": names_in(planners), "controllers": names_in(controllers)}
     lines = [f"{key} = {json.dumps(values, ensure_ascii=False)}" for key, values in lists.items()]
     return "\n".join(['name = "compare"', *lines, f"runs = {seeds}"]) + "\n"
-
-
-def _names(listed: str) -> list[str]:
-    return [name.strip() for name in listed.split(",") if name.strip()]

@@ -16,6 +16,7 @@ from companion.mapping.map_files import MapError
 from companion.settings import Settings
 from companion.settings.versions import made_with
 from sitl.cli.extras import statistics_fault
+from sitl.cli.named import names_in
 from sitl.experiments.experiment import OFF_MODEL, Checked, Experiment, ExperimentError, ExperimentReport, Options
 
 EXPERIMENTS = (
@@ -138,12 +139,12 @@ def experiment(
         writable(json_file)
         writable(docs and docs / "results.md")
         for option, listed in (("--planners", planners), ("--controllers", controllers), ("--missions", missions)):
-            if listed and not _names(listed):
+            if listed and not names_in(listed):
                 raise ExperimentError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
         options = Options(
-            runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, _names(controllers), _names(setups),
-            guard, off, late, keep, _names(missions),
+            runs, seed, jobs, maps, tuple(world or ()), names_in(planners), worlds, names_in(controllers),
+            names_in(setups), guard, off, late, keep, names_in(missions),
         )  # fmt: skip
         _refuse_unused_motion(name, options)
         report = _with_progress(name, options, console)
@@ -154,10 +155,6 @@ def experiment(
     except (ExperimentError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-
-
-def _names(listed: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in listed.split(",") if name.strip())
 
 
 def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: Path | None) -> None:
