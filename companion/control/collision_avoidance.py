@@ -48,8 +48,9 @@ from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
 Foresees = Callable[[Points], Points | None]
 """Where the rover will be at these moments, seconds from now on."""
-MARGIN_SHARES = (1.0, 0.5)
-"""First with the whole margin, then with half: going on with half the margin is better than leaving the path."""
+HALF_MARGIN = 0.5
+"""Going on for good with half the margin, or stopping, is better than leaving the path. Not going on for a little: a
+rover that brakes would spend the rest of the margin on it, and brake late."""
 NEAR_M = 0.15
 """If every option touches something in the end, the option is taken that comes within this distance latest."""
 AS_LATE_S = 0.5
@@ -139,14 +140,14 @@ def avoided(
         options = list(_on_the_way(outlook, command, line))
     else:
         options = list(_on_as_foreseen(outlook, command, places))
-    for share in MARGIN_SHARES:
-        good = [option for option in options if room_m(option, share) >= 0.0]
+    for share, tried in ((1.0, options), (HALF_MARGIN, [options[0], options[-1]])):
+        good = [option for option in tried if room_m(option, share) >= 0.0]
         if good:
             positions = (option for option in good if isinstance(option.command.setpoint, GuidedPosition))
             return next((one for one in positions if _may_be_the_last(one.command, view, discs)), good[0])
     turns_on_the_spot = view.rover.turning_radius_m == 0.0
     for option in _out_of_the_way(outlook, moving, aside_rad) if turns_on_the_spot else _on_arcs(outlook):
-        if room_m(option, MARGIN_SHARES[-1]) >= 0.0:
+        if room_m(option, HALF_MARGIN) >= 0.0:
             return option
         options.append(option)
 
@@ -178,7 +179,7 @@ def _may_be_the_last(command: ControlCommand, view: LocalView, discs: Points) ->
     places = np.column_stack(
         (here.north_m + along_m * math.cos(bearing_rad), here.east_m + along_m * math.sin(bearing_rad))
     )
-    margins_m = np.full(len(times_s), MARGIN_SHARES[-1] * view.settings.traffic.margin_m)
+    margins_m = np.full(len(times_s), HALF_MARGIN * view.settings.traffic.margin_m)
     return least_room_m(places, discs, times_s, margins_m) >= 0.0
 
 

@@ -46,7 +46,7 @@ class DragWatch:
     def __init__(self) -> None:
         self._time_s = -math.inf
         self._held_m_s = 0.0
-        self._held_until_s = -math.inf
+        self._held_until_s = self._dragged_until_s = -math.inf
         self._light_s: float | None = None
 
     def held_m_s(self, throttle: ThrottleSeen | None, full_m_s: float, view: LocalView) -> float:
@@ -65,6 +65,8 @@ class DragWatch:
             self._held_until_s = now_s
         if self._light_s is None or self._held_m_s < max(DRAGS_M_S, DRAGS_SHARE * view.speed_m_s):
             self._light_s = now_s
+        if self.dragged_m_s() > 0.0:
+            self._dragged_until_s = now_s
         return self._held_m_s
 
     def dragged_m_s(self) -> float:
@@ -75,6 +77,10 @@ class DragWatch:
     def closes(self) -> bool:
         """Whether the throttle may still be open from when the ground held the rover."""
         return self._time_s - self._held_until_s < CLOSES_S
+
+    def misleads(self) -> bool:
+        """Whether the ground drags the rover, or lately did: what it does then tells nothing of it on firm ground."""
+        return self._time_s - self._dragged_until_s < CLOSES_S
 
 
 def braked_harder(command: ControlCommand, view: LocalView, bounds: Bounds, *, closes: bool) -> ControlCommand:

@@ -106,11 +106,16 @@ class MotionController:
         return path
 
     def foreseen(self, path: ReferencePath, view: LocalView, times_s: Points) -> Points | None:
-        """The motion that was chosen, as told, and then on along the path; None while a position leads along it."""
+        """The motion that was chosen, as told, and then on along the path; None while a position leads along it.
+
+        It brakes no better than a rover that is told to stand is taken to: else going on would seem to end sooner.
+        """
         if self.choice is None or self.choice.time_s != view.pose.time_s or self.choice.ahead is not None:
             return None
         motion, problem, corner = self.choice.found.motion.copy(), self.choice.problem, self.choice.corner
         motion[0] = self.choice.told.speed_m_s, self.choice.told.turn_rad_s
+        brakes_m_s2 = min(problem.model.decel_m_s2, view.settings.guidance.deceleration_m_s2)
+        problem = problem._replace(model=problem.model._replace(decel_m_s2=brakes_m_s2))
         way = way_of(motion, problem)[:, ::-1] + (corner.north_m, corner.east_m)
         last_s = STEP_S * (len(way) - 1)
         moves_s = np.minimum(times_s, last_s)

@@ -205,7 +205,8 @@ class MissionRun:
         held_m_s = self._drag.held_m_s(self.vehicle.throttle, full_m_s, view)
         view = changed(view, held_m_s=held_m_s, dragged_m_s=self._drag.dragged_m_s())
         view = changed(view, told=told, lately=self._lately, placed_s=self._placed_s)
-        executor.learn(view)
+        if not self._drag.misleads():
+            executor.learn(view)
         wanted = executor.guide(task, view)
         wanted = self.legs.guide(wanted, executor, view)
         wanted = braked_harder(wanted, view, executor.layout.bounds, closes=self._drag.closes())

@@ -80,6 +80,26 @@ def test_it_stops_before_the_way_of_what_crosses() -> None:
     assert made(crossing(-3.0, 1.2)).command.setpoint == GuidedVelocity(0.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("speed_m_s", "told_m_s", "north_m", "east_m"),
+    [(0.6, 0.2, 21.7, -1.75), (0.6, 0.5, 21.85, -2.25), (0.9, 0.2, 22.15, -2.0), (1.2, 0.5, 22.75, -3.0)],
+)
+def test_a_rover_that_can_stop_only_with_half_the_margin_does_not_go_on_a_little_first(
+    speed_m_s: float, told_m_s: float, north_m: float, east_m: float
+) -> None:
+    """Told to drive on, and to brake, in turn, it would brake late."""
+    now = ControlCommand(Purpose.DRIVE, GuidedVelocity(told_m_s, 0.0), told_m_s)
+
+    def slows(times_s: Points) -> Points:
+        fine_s = np.arange(0.0, times_s[-1] + 0.01, 0.01)
+        speeds = np.maximum(speed_m_s - 0.8 * np.maximum(fine_s - 0.25, 0.0), told_m_s)
+        along_m = np.interp(times_s, fine_s, np.concatenate(([0.0], np.cumsum(0.01 * speeds[:-1]))))
+        return np.column_stack((HERE.north_m + along_m, np.full(len(times_s), HERE.east_m)))
+
+    option = avoided(now, PATH, view(speed_m_s), (crossing(east_m, 0.8, north_m),), foresees=slows)
+    assert option.command == stop_for(Purpose.BRAKE)
+
+
 def test_it_goes_on_while_it_can_still_stop_later() -> None:
     far = Moving("m", 100.0, NedPoint(32.0, 12.0), 0.0, 1.2, 0.5)
     assert goes_on(made(far))

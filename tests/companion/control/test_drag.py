@@ -144,3 +144,13 @@ def test_a_dragged_rover_shoots_the_way_it_rolls(rolls_back: bool, shoots_m_s: f
     held = replace(view(ground()), speed_m_s=0.8, dragged_m_s=1.5, rolls_back=rolls_back)
     assert held.shoots_m_s == pytest.approx(shoots_m_s)
     assert replace(held, dragged_m_s=0.0).shoots_m_s == held.forward_m_s
+
+
+def test_ground_that_drags_misleads_until_the_throttle_is_closed_again() -> None:
+    watch = DragWatch()
+    for tick in range(41):
+        held_m_s(watch, 1.0, 0.8, 0.05 * tick)
+        assert watch.misleads() == (tick * 0.05 > DRAGS_S - 1e-6)
+    for since_s, misleads in ((0.5, True), (CLOSES_S, True), (CLOSES_S + 1.0, False)):
+        held_m_s(watch, 0.2, 1.0, 2.0 + since_s)
+        assert watch.misleads() == misleads

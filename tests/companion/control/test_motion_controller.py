@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from companion.control.controller import Purpose
-from companion.control.following import AS_SHIPPED, turn_gains, within_limits
+from companion.control.following import AS_SHIPPED, Following, turn_gains, within_limits
 from companion.control.local_view import LocalView
 from companion.control.motion_controller import (
     MotionController,
@@ -19,6 +19,7 @@ from companion.control.motion_controller import (
 )
 from companion.control.motion_kernels import clearance_m, moved
 from companion.control.motion_planners import motion_planner
+from companion.control.motion_prediction import braked_m
 from companion.control.reference_path import ReferencePath, advanced
 from companion.control.told import Told, ToldVelocity, after
 from companion.core.footprint import Footprint
@@ -281,6 +282,21 @@ def test_it_foresees_what_it_told_and_then_the_path() -> None:
     assert np.hypot(*(places[0] - (3.0, 10.0))) < 0.01 and steps_m.max() < 0.45
     assert abs(places[-1, 1] - 10.0) < 0.3 and 11.0 < places[-1, 0] < 14.5
     assert leads.foreseen(PATH, replace(at, pose=replace(at.pose, time_s=1.0)), times_s) is None
+
+
+def test_it_foresees_no_better_braking_than_of_a_rover_that_is_told_to_stand() -> None:
+    """Whatever is thought to be known of the brakes: else to go on seems to end sooner than to stop."""
+    evidence = ground()
+    wall(evidence, 5.2, 8.0, 12.0)
+    hard = Following(deceleration_m_s2=2.2, off_model=0.1)
+    leads, at = controller(), replace(view(evidence, Pose(3.0, 10.0, 0.0, 0.0), 1.9), following=hard)
+    times_s = np.arange(0.0, 2.4, 0.2)
+    leads.follow(PATH, at)
+    assert leads.choice is not None and leads.choice.told.speed_m_s < 1.0
+    places = leads.foreseen(PATH, at, times_s)
+    assert places is not None
+    rolled_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))))
+    assert np.all(rolled_m[:8] >= braked_m(1.9, times_s, at.settings.guidance)[:8] - 0.15)
 
 
 def test_it_foresees_that_it_backs_off() -> None:
