@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import math
 
-from companion.control.controller import ControlCommand
-from companion.control.local_view import LocalView
+from companion.control.controller import ControlCommand, Purpose
+from companion.control.local_view import LocalView, is_held_much
 from companion.control.setpoint_check import fault_of
 from companion.mission.bounds import Bounds
 from companion.vehicle.commands import GuidedVelocity
@@ -25,9 +25,8 @@ SLACK_M_S = 0.3
 """A rover on firm ground is so much slower than its throttle says: it is read in whole per cent, and late."""
 FORGOTTEN_S = 0.5
 """What it was held by falls off with this time constant: the throttle is read ten times a second."""
-DRAGS_M_S, DRAGS_SHARE, DRAGS_S = 0.4, 0.5, 1.0
-"""Ground drags a rover that is held for so long by so much, and by such a share of its own speed. Less may be a rover
-that gathers speed, or whose throttle says something else than the companion was told."""
+DRAGS_S = 1.0
+"""Ground drags a rover that is held much for so long."""
 HELD_M_S = 0.2
 """A rover that is held by less stands soon enough."""
 ROLLS_M_S = 0.1
@@ -63,7 +62,7 @@ class DragWatch:
         self._held_m_s = max(held_m_s, kept * self._held_m_s)
         if self._held_m_s >= HELD_M_S:
             self._held_until_s = now_s
-        if self._light_s is None or self._held_m_s < max(DRAGS_M_S, DRAGS_SHARE * view.speed_m_s):
+        if self._light_s is None or not is_held_much(self._held_m_s, view.speed_m_s):
             self._light_s = now_s
         if self.dragged_m_s() > 0.0:
             self._dragged_until_s = now_s
@@ -86,13 +85,15 @@ class DragWatch:
 def braked_harder(command: ControlCommand, view: LocalView, bounds: Bounds, *, closes: bool) -> ControlCommand:
     """The command; or, where it tells a rover to stand that the ground holds and that rolls on, to roll back.
 
-    ``closes``: or has held, see ``DragWatch``. Only as fast as the rover may be left alone with.
+    ``closes``: or has held, see ``DragWatch``. It turns as told, and only as fast as it may be left alone with.
     """
-    stands = command.setpoint == GuidedVelocity(0.0, 0.0)
-    if not stands or not closes or view.forward_m_s < ROLLS_M_S:
+    told = command.setpoint
+    if not isinstance(told, GuidedVelocity) or not closes or view.forward_m_s < ROLLS_M_S:
+        return command
+    if told.forward_m_s != 0.0 or (told.yaw_rate_rad_s != 0.0 and command.purpose is not Purpose.BRAKE):
         return command
     for speed_m_s in BACK_M_S:
-        back = GuidedVelocity(-speed_m_s, 0.0)
+        back = GuidedVelocity(-speed_m_s, told.yaw_rate_rad_s)
         if fault_of(back, view, bounds) is None:
             return ControlCommand(command.purpose, back, 0.0)
     return command

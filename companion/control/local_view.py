@@ -20,6 +20,9 @@ from companion.vehicle.commands import GuidedPosition, Setpoint
 
 MOST_FURTHER_M = 3.0
 """No rover shoots farther: its throttle closes meanwhile."""
+DRAGS_M_S, DRAGS_SHARE = 0.4, 0.5
+"""Ground may drag a rover that is held by so much, and by such a share of its own speed. Less may be a rover that
+gathers speed, or whose throttle says something else than the companion was told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,11 @@ class LocalView:
         return isinstance(self.told, GuidedPosition) or time_s <= self.placed_s
 
     @property
+    def may_be_dragged(self) -> bool:
+        """Whether the ground seems to drag it, or it gathers speed."""
+        return is_held_much(self.held_m_s, self.speed_m_s)
+
+    @property
     def further_m(self) -> float:
         """So much farther than usual the rover may go before it stands: where ground ends that holds it."""
         return min(self.settings.guidance.held_overshoot_s * self.held_m_s, MOST_FURTHER_M)
@@ -77,3 +85,8 @@ class LocalView:
     def with_speeds(self, cruise_speed_m_s: float, fastest_m_s: float) -> LocalView:
         """The same moment with another cruise speed, and with the highest speed that is ever told on this way."""
         return changed(self, rover=changed(self.rover, cruise_speed_m_s=cruise_speed_m_s, fastest_m_s=fastest_m_s))
+
+
+def is_held_much(held_m_s: float, speed_m_s: float) -> bool:
+    """Whether ground that drags a rover of this speed would hold it by so much."""
+    return held_m_s >= max(DRAGS_M_S, DRAGS_SHARE * speed_m_s)

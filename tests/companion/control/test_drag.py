@@ -87,6 +87,8 @@ def test_a_rover_that_is_held_and_rolls_on_is_told_to_roll_back_until_it_stands(
     assert back.purpose is Purpose.BRAKE
     assert isinstance(back.setpoint, GuidedVelocity) and back.setpoint == GuidedVelocity(-BACK_M_S[0], 0.0)
     assert braked_harder(STAND, held, Bounds(), closes=False) == STAND
+    turns = ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, 0.5), 0.0)
+    assert braked_harder(turns, held, Bounds(), closes=True).setpoint == GuidedVelocity(-BACK_M_S[0], 0.5)
     for stands in (replace(held, speed_m_s=0.05), replace(held, rolls_back=True)):
         assert braked_harder(STAND, stands, Bounds(), closes=True) == STAND
 

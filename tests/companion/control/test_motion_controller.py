@@ -12,6 +12,7 @@ from companion.control.controller import Purpose
 from companion.control.following import AS_SHIPPED, Following, turn_gains, within_limits
 from companion.control.local_view import LocalView
 from companion.control.motion_controller import (
+    FASTER_DRAGGED_M_S,
     MotionController,
     _faster_s,
     _latest,
@@ -282,6 +283,17 @@ def test_it_foresees_what_it_told_and_then_the_path() -> None:
     assert np.hypot(*(places[0] - (3.0, 10.0))) < 0.01 and steps_m.max() < 0.45
     assert abs(places[-1, 1] - 10.0) < 0.3 and 11.0 < places[-1, 0] < 14.5
     assert leads.foreseen(PATH, replace(at, pose=replace(at.pose, time_s=1.0)), times_s) is None
+
+
+def test_a_rover_that_the_ground_drags_is_told_little_more_than_its_speed() -> None:
+    """Else the throttle opens wide, and the rover shoots ahead where such ground ends."""
+    slow = view(ground(), Pose(3.0, 10.0, 0.0, 0.0), 0.6)
+    for held_m_s, fastest_m_s in ((0.0, 2.0), (0.3, 2.0), (1.5, 0.6 + FASTER_DRAGGED_M_S)):
+        leads, at = controller(), replace(slow, held_m_s=held_m_s)
+        assert rover_model(at).fastest_m_s == pytest.approx(fastest_m_s)
+        leads.follow(PATH, at)
+        assert leads.choice is not None
+        assert 0.5 < leads.choice.told.speed_m_s <= fastest_m_s
 
 
 def test_it_foresees_no_better_braking_than_of_a_rover_that_is_told_to_stand() -> None:
