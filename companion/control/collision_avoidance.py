@@ -6,7 +6,8 @@ room. If all would touch something, those count that go well for longest: the ro
 already, else it takes the one with which the two would meet at the lowest speed.
 
 The rover stops before the way of others, since going on is allowed only while there still is somewhere to stop; and it
-waits there until going on is safe again. Of positions that are as good the first is told with which a rover that is
+waits there until going on is safe again. Once it stops for something it goes on only for good: else it would drive
+along beside that, always about to pass in front of it. Of positions that are as good the first is told with which a rover that is
 left alone is not met, if there is one. Each option says what the autopilot would be told and where the rover would
 then be at each moment; the ground there must be clear and seen.
 
@@ -87,11 +88,20 @@ class Option:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Outlook:
-    """A moment, and the moments from now on that count (``times_s``). ``backwards``: the rover rolls tail first."""
+    """A moment, and the moments from now on that count (``times_s``).
+
+    ``backwards``: the rover rolls tail first. ``stops``: it was told to because of what moves.
+    """
 
     view: LocalView
     times_s: Points
     backwards: bool = False
+    stops: bool = False
+
+    @property
+    def goes_on_s(self) -> tuple[float, ...]:
+        """How long it might go on before it stops."""
+        return GO_ON_S[:1] if self.stops else GO_ON_S
 
     @property
     def guidance(self) -> GuidanceSettings:
@@ -115,17 +125,18 @@ def avoided(
     moving: tuple[Moving, ...],
     *,
     aside_rad: float | None = None,
+    stops: bool = False,
     backwards: bool = False,
     foresees: Foresees | None = None,
 ) -> Option:
     """What to do because of what moves, when the controller says ``command``; that command if nothing comes across.
 
     ``line``: what the rover is led along. ``aside_rad``: the bearing to which it moves aside already; it keeps to that.
-    ``backwards``: it rolls tail first. ``foresees``: where the rover will be with that command, if it is known better
+    ``stops``: it stops already. ``backwards``: it rolls tail first. ``foresees``: where the rover will be with that command, if it is known better
     than that it follows the line.
     """
     times_s = np.arange(0.0, view.settings.traffic.look_s + 1e-9, PERIOD_S)
-    outlook = Outlook(view, times_s, backwards)
+    outlook = Outlook(view, times_s, backwards, stops)
     moving = tuple(one for one in moving if _matters(one, view))
     if not moving:
         return Option(command, _halted(outlook), yields=False)
@@ -184,10 +195,11 @@ def _may_be_the_last(command: ControlCommand, view: LocalView, discs: Points) ->
 
 
 class CollisionAvoidance:
-    """Remembers where the rover moves aside to, and since when avoiding has kept it from getting on."""
+    """Remembers whether the rover stops or moves aside, and since when avoiding has kept it from getting on."""
 
     def __init__(self) -> None:
         self._aside_rad: float | None = None
+        self._stops = False
         self._since_s: float | None = None
 
     def avoid(
@@ -201,8 +213,12 @@ class CollisionAvoidance:
         foresees: Foresees | None = None,
     ) -> Option:
         """What to do, as ``avoided`` says."""
-        option = avoided(command, line, view, moving, aside_rad=self._aside_rad, backwards=backwards, foresees=foresees)
+        option = avoided(
+            command, line, view, moving,
+            aside_rad=self._aside_rad, stops=self._stops, backwards=backwards, foresees=foresees,
+        )  # fmt: skip
         self._aside_rad = option.aside_rad
+        self._stops = option.yields and option.command.purpose is Purpose.BRAKE
         return option
 
     def is_patient(self, now_s: float, patience_s: float, *, yields: bool) -> bool:
@@ -243,7 +259,7 @@ def _on_the_way(outlook: Outlook, command: ControlCommand, line: ReferencePath |
     if command.purpose is Purpose.DRIVE and line is not None:
         way = _told_way(command, line, view.pose)
         course_rad = view.pose.heading_rad + (math.pi if outlook.backwards else 0.0)
-        for goes_s in GO_ON_S:
+        for goes_s in outlook.goes_on_s:
             along_m = outlook.driven_m(command.speed_m_s, goes_s)
             places = steered_along(way, course_rad, along_m, view.rover.turning_radius_m)
             nearer = _nearer(command, view.pose, along_m)
@@ -256,7 +272,7 @@ def _on_the_way(outlook: Outlook, command: ControlCommand, line: ReferencePath |
 def _on_as_foreseen(outlook: Outlook, command: ControlCommand, places: Points) -> Iterator[Option]:
     """Going on as foreseen, going on a little, stopping."""
     reached_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))))
-    for goes_s in GO_ON_S:
+    for goes_s in outlook.goes_on_s:
         last = int(np.searchsorted(outlook.times_s, goes_s, side="right")) - 1
         speed_m_s = (reached_m[last] - reached_m[max(last - 1, 0)]) / PERIOD_S
         rolls_m = braked_m(speed_m_s, np.maximum(outlook.times_s - outlook.times_s[last], 0.0), outlook.guidance)

@@ -100,6 +100,25 @@ def test_a_rover_that_can_stop_only_with_half_the_margin_does_not_go_on_a_little
     assert option.command == stop_for(Purpose.BRAKE)
 
 
+def test_once_it_stops_for_something_it_does_not_go_on_beside_it() -> None:
+    """Its path turns off in front of a walker: a little farther it may always go. When it stops, the walker passes."""
+    on, brake = ControlCommand(Purpose.DRIVE, GuidedVelocity(1.0, 0.0), 1.0), stop_for(Purpose.BRAKE)
+
+    def turns_off(times_s: Points) -> Points:
+        along_m = 1.0 * times_s
+        return np.column_stack((HERE.north_m + np.minimum(along_m, 3.0), HERE.east_m + np.maximum(along_m - 3.0, 0.0)))
+
+    beside = Moving("m", 100.0, NedPoint(18.9, 21.5), 0.9, 0.0, 0.4)
+    assert avoided(on, PATH, view(0.8), (beside,), foresees=turns_off).command == on
+    assert avoided(on, PATH, view(0.8), (beside,), foresees=turns_off, stops=True).command == brake
+    led, crosses = CollisionAvoidance(), crossing(-1.5, 0.9, 22.5)
+    told = [
+        led.avoid(on, PATH, view(0.8), moving, backwards=False, foresees=turns_off).command
+        for moving in ((beside,), (crosses,), (beside,), (), (beside,))
+    ]
+    assert told == [on, brake, brake, on, on], "until nothing is in the way"
+
+
 def test_it_goes_on_while_it_can_still_stop_later() -> None:
     far = Moving("m", 100.0, NedPoint(32.0, 12.0), 0.0, 1.2, 0.5)
     assert goes_on(made(far))
