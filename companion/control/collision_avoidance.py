@@ -7,9 +7,9 @@ already, else it takes the one with which the two would meet at the lowest speed
 
 The rover stops before the way of others, since going on is allowed only while there still is somewhere to stop; and it
 waits there until going on is safe again. Once it stops for something it goes on only for good: else it would drive
-along beside that, always about to pass in front of it. Of positions that are as good the first is told with which a rover that is
-left alone is not met, if there is one. Each option says what the autopilot would be told and where the rover would
-then be at each moment; the ground there must be clear and seen.
+along beside that, always about to pass in front of it. Of positions that are as good the first is told with which a
+rover that is left alone is not met, if there is one. Each option says what the autopilot would be told and where the
+rover would then be at each moment; the ground there must be clear and seen.
 
 Nouns: collision avoidance, yielding.
 """
@@ -132,8 +132,8 @@ def avoided(
     """What to do because of what moves, when the controller says ``command``; that command if nothing comes across.
 
     ``line``: what the rover is led along. ``aside_rad``: the bearing to which it moves aside already; it keeps to that.
-    ``stops``: it stops already. ``backwards``: it rolls tail first. ``foresees``: where the rover will be with that command, if it is known better
-    than that it follows the line.
+    ``stops``: it stops already. ``backwards``: it rolls tail first. ``foresees``: where the rover will be with that
+    command, if it is known better than that it follows the line.
     """
     times_s = np.arange(0.0, view.settings.traffic.look_s + 1e-9, PERIOD_S)
     outlook = Outlook(view, times_s, backwards, stops)
