@@ -35,11 +35,15 @@ export function drawFrame(pen, model) {
 export function drawNothingYet(pen, { frame, map, scene }) {
   if (frame?.pose || map.shape || scene?.home) return;
   const { camera, colours } = pen;
-  const [x, y] = [(camera.width - camera.coveredRight) / 2, (camera.height - camera.covered) / 2];
-  const head = { size: 17, weight: 750 };
+  const free = camera.width - camera.coveredRight;
+  const [x, y] = [free / 2, (camera.height - camera.covered) / 2];
   const lines = ["No position of the rover yet"];
   if (frame?.state !== "ended") lines.push("The map begins with it");
-  const width = Math.max(...lines.map((line) => pen.widthOf(line, head))) + 32;
+  const widthIn = (look) => Math.max(...lines.map((line) => pen.widthOf(line, look)));
+  const usual = { size: 17, weight: 750 };
+  // Beside the map's buttons a phone has little room.
+  const head = { ...usual, size: usual.size * Math.min(1, Math.max(free - 48, 0) / widthIn(usual)) };
+  const width = widthIn(head) + 32;
   plate(pen, x - width / 2, y - 28, width, 28 * lines.length + 6);
   lines.forEach((line, i) => {
     const look = i ? { colour: colours.soft } : head;
