@@ -6,6 +6,7 @@ Nouns: serial port.
 from __future__ import annotations
 
 import contextlib
+import re
 import threading
 from collections import deque
 from collections.abc import Sequence
@@ -59,9 +60,9 @@ class SerialLidarPort:
         try:
             self._port: serial.Serial | None = self._opened()
         except (OSError, ValueError) as error:
-            raise LidarError(
-                f"lidar '{spec.text}': {spec.port} cannot be opened: {open_reason(error, spec.port)}"
-            ) from error
+            rated = re.search(r":\d+$", spec.port)
+            reason = f"leave {rated[0]} out, the model says the baud rate" if rated else open_reason(error, spec.port)
+            raise LidarError(f"lidar '{spec.text}': {spec.port} cannot be opened: {reason}") from error
         self._thread = threading.Thread(target=self._run, name=f"lidar {spec.port}", daemon=True)
         self._thread.start()
 

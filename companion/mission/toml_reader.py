@@ -337,9 +337,17 @@ def _refuse_world(path: Path) -> None:
         )
 
 
+def _fences(path: Path, name: str) -> Mission:
+    """What the file of fences says. Raises MissionError, with the mission that names it."""
+    try:
+        return load_ground_station_file(path.parent / name, skip_unknown=True)
+    except MissionError as error:
+        raise MissionError(f"{path}: fence: {error}") from error
+
+
 def _mission(table: MissionTable, path: Path) -> Mission:
     folder = path.parent
-    fences = load_ground_station_file(folder / table.fence, skip_unknown=True) if table.fence else None
+    fences = _fences(path, table.fence) if table.fence else None
     keep_out = tuple(_named(path, "keep_out", i, item.area) for i, item in enumerate(table.keep_out, 1))
     keep_in = tuple(_named(path, "keep_in", i, item.area) for i, item in enumerate(table.keep_in, 1))
     targets = tuple(_named(path, "target", i, partial(item.target, i)) for i, item in enumerate(table.target, 1))

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
-
-from companion.cli.entry import start
 
 
 def main() -> None:
     """Entry point of the ``rover-sitl`` script."""
+    try:
+        from companion.cli.entry import start
+    except KeyboardInterrupt:
+        print("rover-sitl: stopped by Ctrl-C", file=sys.stderr)
+        raise SystemExit(130) from None
     raise SystemExit(start("rover-sitl", _commands))
 
 
