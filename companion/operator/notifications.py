@@ -113,8 +113,8 @@ class Notifier:
         """Keep a text of the autopilot's for the terminal."""
         self.news.append(News(severity, text, own=False))
 
-    def tell_faults(self, run: MissionRun, now_s: float, problem: str) -> None:
-        """Faults that stop nothing, each told once. ``problem``: of the record or the state file."""
+    def tell_faults(self, run: MissionRun, now_s: float, problems: tuple[str, ...]) -> None:
+        """Faults that stop nothing, each told once. ``problems``: of the record and the state file."""
         if run.vehicle.heartbeat is not None and self._autopilot.signing_trouble:
             self.once(self._autopilot.signing_trouble)
         if run.executor is None:
@@ -125,11 +125,11 @@ class Notifier:
             self._followed_s = now_s
         elif now_s - self._followed_s > NOT_FOLLOWED_S:
             self.once("The autopilot follows another target than the one sent: does another program steer it?")
-        for text in self.lasting_faults(self._autopilot.rate_faults, problem, now_s):
+        for text in self.lasting_faults(self._autopilot.rate_faults, problems, now_s):
             self.once(text)
 
-    def lasting_faults(self, rates: tuple[RateFault, ...], problem: str, now_s: float) -> list[str]:
-        """The texts for messages that have come too seldom for some time, and for ``problem``; each is given once."""
+    def lasting_faults(self, rates: tuple[RateFault, ...], problems: tuple[str, ...], now_s: float) -> list[str]:
+        """The texts for messages that have come too seldom for some time, and for ``problems``; each is given once."""
         slow = {fault.message_id: self._slow_since_s.get(fault.message_id, now_s) for fault in rates}
         self._slow_since_s = slow
         texts = {
@@ -137,8 +137,7 @@ class Notifier:
             for fault in rates
             if now_s - slow[fault.message_id] >= FAULT_AFTER_S
         }
-        if problem:
-            texts[problem] = problem
+        texts.update({problem: problem for problem in problems})
         new = [text for what, text in texts.items() if what not in self._faults_told]
         self._faults_told.update(texts)
         return new

@@ -31,9 +31,10 @@ class RunSaver:
         self._localization = localization
         self._shutdown = shutdown
 
-    def note_problem(self) -> str:
-        """What is wrong with the record or the state file, for people; empty if nothing is. Noted in the record."""
-        return self._log.problem or (self._checkpointer.problem_text(self._log) if self._checkpointer else "")
+    def note_problems(self) -> tuple[str, ...]:
+        """What is wrong with the record and with the state file, for people. Noted in the record."""
+        unsaved = self._checkpointer.problem_text(self._log) if self._checkpointer else ""
+        return tuple(filter(None, (self._log.problem, unsaved)))
 
     def resume(self, executor: MissionExecutor, now_s: float) -> bool:
         """Go on in the middle of the leg of an earlier run; False when there is none to take up."""

@@ -87,7 +87,7 @@ class Supervisor:
         if task is MissionTask.END:
             self._end_mission(now_s)
         self._saver.save(now_s, done=self.done)
-        self._notifier.tell_faults(self._run, now_s, self._saver.note_problem())
+        self._notifier.tell_faults(self._run, now_s, self._saver.note_problems())
 
     def close(self, clock: Clock) -> None:
         """The way out after an error: a rover that is ours is stopped and put into HOLD before this returns."""

@@ -197,7 +197,7 @@ def test_that_the_sticks_are_never_seen_is_told_but_not_that_they_are_seen_seldo
     (fault,) = bench.link.rate_faults
     assert (fault.name, fault.means) == ("RC_CHANNELS", "the pilot's sticks are not seen")
     notifier = Notifier(bench.link, HandClock(), [])
-    assert [notifier.lasting_faults((fault,), "", time_s) for time_s in (0.0, FAULT_AFTER_S, 100.0)] == [
+    assert [notifier.lasting_faults((fault,), (), time_s) for time_s in (0.0, FAULT_AFTER_S, 100.0)] == [
         [],
         ["RC_CHANNELS: 0.0 Hz instead of 5, asking again: the pilot's sticks are not seen"],
         [],

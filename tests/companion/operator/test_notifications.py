@@ -57,15 +57,15 @@ def test_only_the_newest_texts_are_kept() -> None:
 
 def test_a_low_rate_is_told_once_and_only_when_it_lasts() -> None:
     one, _ = notifier()
-    assert one.lasting_faults((SLOW,), "", 0.0) == []
-    assert one.lasting_faults((), "", 3.0) == []
-    assert one.lasting_faults((SLOW,), "", 4.0) == []
-    assert one.lasting_faults((SLOW,), "", 4.0 + FAULT_AFTER_S) == [
+    assert one.lasting_faults((SLOW,), (), 0.0) == []
+    assert one.lasting_faults((), (), 3.0) == []
+    assert one.lasting_faults((SLOW,), (), 4.0) == []
+    assert one.lasting_faults((SLOW,), (), 4.0 + FAULT_AFTER_S) == [
         "LOCAL_POSITION_NED: 1.0 Hz instead of 10, asking again"
     ]
-    assert one.lasting_faults((RateFault(32, 10.0, 2.0),), "", 30.0) == []
-    assert one.lasting_faults((), "the record has ended", 31.0) == ["the record has ended"]
-    assert one.lasting_faults((), "the record has ended", 32.0) == []
+    assert one.lasting_faults((RateFault(32, 10.0, 2.0),), (), 30.0) == []
+    assert one.lasting_faults((), ("the record has ended",), 31.0) == ["the record has ended"]
+    assert one.lasting_faults((), ("the record has ended",), 32.0) == []
 
 
 def status(activity: Activity, *news: str, target: str = "", time_s: float = 0.0) -> Status:

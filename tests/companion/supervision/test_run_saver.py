@@ -18,10 +18,26 @@ def test_faults_that_stop_nothing_are_told_once(whole: Whole) -> None:
     assert whole.companion.outcome.said.count("The state cannot be saved") == 1
 
 
+class Unsaved:
+    """A checkpointer whose disk is full."""
+
+    def problem_text(self, log: object) -> str:
+        return "The state cannot be saved"
+
+
+def test_a_record_that_has_ended_does_not_hide_that_the_state_cannot_be_saved() -> None:
+    """One full disk is usual for both."""
+    log, unused = Log(), Unsaved()
+    log.problem = "the record has ended"
+    saver: Any = RunSaver
+    told = saver(None, unused, log, None, None).note_problems()
+    assert told == ("the record has ended", "The state cannot be saved")
+
+
 def test_without_a_state_file_nothing_is_saved(tmp_path: Path) -> None:
     desk = Desk(tmp_path)
     executor = desk.begin()
     unused: Any = None
     saver = RunSaver(desk.run, None, Log(), unused, unused)
     saver.save(10.0, done=True)
-    assert not saver.resume(executor, 10.0) and saver.note_problem() == ""
+    assert not saver.resume(executor, 10.0) and saver.note_problems() == ()
