@@ -37,7 +37,10 @@ def _copy(folder: Path, place: Path) -> None:
     try:
         shutil.copytree(folder, place, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     except (OSError, shutil.Error) as error:
-        what = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        typer.echo(f"{place}: cannot be made: {what}; name a folder that is not there yet", err=True)
+        # Of a shutil.Error the first file that failed tells enough.
+        many = isinstance(error, shutil.Error) and bool(error.args) and isinstance(error.args[0], list)
+        what = str(error.args[0][0][2]) if many else (error.strerror or str(error))
+        remedy = "make room, and delete it first" if many else "name a folder that is not there yet"
+        typer.echo(f"{place}: cannot be made: {what}; {remedy}", err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     typer.echo(f"copied to {place}; rover-sitl drive {place / ONE} drives one")
