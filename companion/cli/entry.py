@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import reprlib
 import signal
 import sys
 from collections.abc import Callable
@@ -93,7 +94,7 @@ def _run(name: str, commands: Callable[..., object]) -> int:
         raise KeyboardInterrupt from None
     except usage_error as error:
         where = error.ctx.command_path if error.ctx is not None else name
-        print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)
+        print(f"{where}: {error.format_message()}{_got(error)} (see {where} --help)", file=sys.stderr)
         return EXIT_USAGE
     except OwnPartError as error:
         print(error, file=sys.stderr)
@@ -114,6 +115,18 @@ def _run(name: str, commands: Callable[..., object]) -> int:
     if code == EXIT_STOPPED:  # returned by newer versions on an interrupt, without a message
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
+
+
+def _got(error: Exception) -> str:
+    """The value that was given, which newer versions of typer leave out of their words; empty if it is not known."""
+    from pydantic import ValidationError
+
+    from companion.storage.validation import number_hint
+
+    if not isinstance(error.__cause__, ValidationError):
+        return ""
+    value = error.__cause__.errors(include_url=False)[0]["input"]
+    return f", got {reprlib.repr(value)}{number_hint(value)}"
 
 
 def _let_go_of_output() -> None:

@@ -56,12 +56,12 @@ def params(
         if write is not None:
             _write(write, wanted, table)
         if check:
-            reader = _read(connect, wanted, StateFiles(state), settings_file, signing_key)
+            reader, place = _read(connect, wanted, StateFiles(state), settings_file, signing_key)
     except (MissionError, SettingsError, OutputError, LinkError, SigningKeyError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     if check:
-        raise typer.Exit(_compare(reader, wanted, str(connect), as_json=as_json))
+        raise typer.Exit(_compare(reader, wanted, place, as_json=as_json))
     if write is None:
         Console().print(_shown(wanted))
 
@@ -94,8 +94,8 @@ def _read(
     files: StateFiles,
     settings_file: Path | None,
     signing_key: Path | None,
-) -> ParameterReader:
-    """The rover's own values. Raises LinkError, SettingsError, SigningKeyError."""
+) -> tuple[ParameterReader, str]:
+    """The rover's own values, and where they were asked for. Raises LinkError, SettingsError, SigningKeyError."""
     if connect is None:
         raise LinkError("params --check: name the rover with --connect")
     try:
@@ -103,16 +103,18 @@ def _read(
         link, clock = open_link(connect), WallClock()
         reader = ParameterReader(link, settings, [one.name for one in wanted], signer)
         began_s = now_s = clock.now_s()
+        typer.echo(f"reading parameters on {connect}", err=True)
         try:
             while not reader.done(now_s) and now_s - began_s < (LIMIT_S if reader.rover_heard else HEARD_S):
                 reader.step(now_s)
                 clock.sleep_until_s(now_s + STEP_S)
                 now_s = clock.now_s()
+            place = link.description
         finally:
             link.close()
     finally:
         files.close()
-    return reader
+    return reader, place
 
 
 def _compare(reader: ParameterReader, wanted: Sequence[WantedParameter], place: str, *, as_json: bool) -> int:

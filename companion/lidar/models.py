@@ -46,10 +46,12 @@ MODELS = (
     LidarModel("RPLIDAR-C1", 460800, RplidarDecoder, 0.05, 12.0, 10.0, 63, (RP_STOP, RP_SCAN), (RP_STOP,), dtr=False),
     LidarModel("YDLIDAR-X4", 128000, YdlidarDecoder, 0.12, 10.0, 7.0, 0, (YD_STOP, YD_SCAN), (YD_STOP,)),
 )
-NAMES = ", ".join(model.name for model in MODELS)
+NAMES = ", ".join(one.name if "-" not in one.name else f"{one.name} ({one.name[-2:]})" for one in MODELS)
+UNSPOKEN = str.maketrans("", "", "-_ ")
+"""Left out where names are compared: people write LD-06, too."""
 
 
 def model_named(name: str) -> LidarModel | None:
     """The model with this name, however it is spelt; None if there is none."""
-    wanted = name.upper().replace("_", "-").replace(" ", "-")
-    return next((one for one in MODELS if one.name in (wanted, f"RPLIDAR-{wanted}", f"YDLIDAR-{wanted}")), None)
+    wanted = name.upper().translate(UNSPOKEN)
+    return next((one for one in MODELS if wanted in (one.name.translate(UNSPOKEN), one.name.rpartition("-")[2])), None)

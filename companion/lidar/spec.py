@@ -9,8 +9,10 @@ import math
 from dataclasses import dataclass, field, replace
 
 from companion.lidar.models import NAMES, LidarModel, model_named
+from companion.storage.validation import alike
 
 FORM = "MODEL:PORT[:yaw=DEG,x=M,y=M,flip,mask=FROM..TO,min=M,max=M,intensity=N,empty=M]"
+OPTIONS = ("yaw", "x", "y", "flip", "mask", "min", "max", "intensity", "empty")
 EMPTY_M = 5.0
 """Beyond this a dark surface may well give no echo though nothing is wrong."""
 LONGEST = 500
@@ -117,7 +119,11 @@ def _with_option(mounting: Mounting, option: str, model: LidarModel, text: str) 
                 raise LidarError(f"lidar '{text}': {option}: the {model.name} does not tell how strong echoes are")
             return replace(mounting, least_quality=int(_number(text, option, 0.0, float(model.most_quality))))
         case _:
-            raise LidarError(f"lidar '{text}': '{option}' is no option; write {FORM}")
+            meant = alike(key, OPTIONS)
+            if meant:
+                raise LidarError(f"lidar '{text}': '{option}' is no option, did you mean {meant}?")
+            hint = "; decimals have a point, 1.8 and not 1,8" if option.isdecimal() else f"; write {FORM}"
+            raise LidarError(f"lidar '{text}': '{option}' is no option{hint}")
 
 
 def _number(text: str, option: str, least: float, most: float) -> float:

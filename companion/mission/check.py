@@ -13,6 +13,8 @@ from companion.storage.files import why_no_file
 
 LARGEST = 1e9
 """A parameter of a command is no larger: it is sent as a float."""
+FASTEST_M_S = 50.0
+LONGEST_HOLD_S = 1e6
 MAX_GRID_FIELDS = 4_000_000
 """Larger grids are refused: the companion holds several rasters of that size."""
 

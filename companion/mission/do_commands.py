@@ -88,6 +88,8 @@ MOVES = frozenset(
 )
 """Commands that a ground station's mission may have, and a target says in other words."""
 OUTPUTS, RELAYS = 32, 16
+PULSE_US = 65_535
+"""ArduRover holds the length of a pulse in 16 bits."""
 RELAY_STATES = (0.0, 1.0)
 """ArduRover switches a relay over with any other state (AP_ServoRelayEvents)."""
 
@@ -163,6 +165,8 @@ def lacking(command: DoCommand) -> str:
         return f"there is no relay {first:g}; relays are counted from 0 to {RELAYS - 1}"
     if command.command in (mav.DO_SET_SERVO, mav.DO_REPEAT_SERVO) and first not in range(1, OUTPUTS + 1):
         return f"there is no output {first:g}; give the number of a SERVOn_FUNCTION, from 1 to {OUTPUTS}"
+    if command.command in (mav.DO_SET_SERVO, mav.DO_REPEAT_SERVO) and not 0.0 <= (command.params[1] or 0.0) <= PULSE_US:
+        return f"a pulse of {command.params[1]:g} µs; it is from 0 (none) to {PULSE_US}, mostly 1000 to 2000"
     if command.command == mav.DO_SET_ROI_LOCATION and command.place is None:
         return "has no place to look at; give its latitude and longitude, or DO_SET_ROI_NONE to look ahead again"
     return ""

@@ -11,6 +11,8 @@ FAR_M = 1000.0
 """A target farther from home than this is told of."""
 SWAPPED_SHARE = 0.1
 """The other way round, a swapped place is nearer to home by this share at least."""
+NOWHERE = GeoPoint(0.0, 0.0)
+"""Where programs put places that nobody told them."""
 EARTH_M = 6_371_000.0
 
 
@@ -39,6 +41,8 @@ def _doubts(mission: Mission, home: GeoPoint | None) -> list[tuple[float, str]]:
             far_m = math.hypot(place.north_m, place.east_m)
             if far_m > FAR_M:
                 doubts.append((far_m, f"{what} is {distance_text(far_m)} from home; is that meant?"))
+        elif place == NOWHERE:
+            doubts.append((math.inf, f"{what} is at latitude 0, longitude 0, in the sea; is that meant?"))
         elif isinstance(place, GeoPoint) and zero is not None and (line := _doubt(place, zero, name)):
             doubts.append((great_circle_m(place, zero), f"{what} {line}"))
     return doubts

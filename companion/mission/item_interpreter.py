@@ -16,6 +16,7 @@ from types import MappingProxyType
 from companion.core.frames import GeoPoint
 from companion.core.grid import BASE_WEIGHT
 from companion.mission import mav_commands as mav
+from companion.mission.check import FASTEST_M_S, LONGEST_HOLD_S
 from companion.mission.do_commands import TAKEN, WITH_PLACE, WITHOUT_EFFECT, DoCommand, lacking, why_not
 from companion.mission.fence_items import fences_of, is_fence
 from companion.mission.item_walk import ItemWalk
@@ -201,8 +202,8 @@ def _travel(item: Item, walk: _Walk) -> None:
         walk.note(f"{item.label}: stays there, the mission ends")
     place = _place(item, walk)
     hold_s = item.param(1) if item.command in (mav.NAV_WAYPOINT, mav.NAV_LOITER_TIME) else 0.0
-    if not (math.isfinite(hold_s) and hold_s >= 0.0):
-        raise ItemError(f"{item.label}: a hold of {hold_s} s; it must not be negative")
+    if not 0.0 <= hold_s <= LONGEST_HOLD_S:
+        raise ItemError(f"{item.label}: a hold of {hold_s:g} s; it is from 0 to {LONGEST_HOLD_S:.0f} s")
     _add(Target(_name(item, walk), place, hold_s=hold_s, speed_m_s=walk.speed_m_s), walk)
     _note_unused(item, walk)
 
@@ -249,7 +250,8 @@ def _circle(item: Item, walk: _Walk) -> None:
         walk.refuse(item, "the centre of its circle is where the rover happens to be")
         return
     if not (0.0 <= turns <= 255.0 and math.isfinite(radius_m) and abs(radius_m) <= 2550.0):
-        raise ItemError(f"{item.label}: {turns:g} turns of {radius_m:g} m radius")
+        limits = "at most 255 turns and 2550 m can be driven"
+        raise ItemError(f"{item.label}: {turns:g} turns of {radius_m:g} m radius; {limits}")
     places = corners(centre, radius_m, turns, before if isinstance(before, GeoPoint) else None)
     name = _name(item, walk)
     for number, place in enumerate(places, 1):
@@ -288,7 +290,8 @@ def _patrol(walk: _Walk, jump: Item, first: int, end: int) -> Patrol:
     ]:
         lap, before = before[-len(lap) :], before[: -len(lap)]
     walk.targets = [*before, *lap]
-    walk.note(f"{jump.label}: a patrol: the last {len(lap)} targets again and again, until somebody ends it")
+    last = f"{len(lap)} targets" if len(lap) > 1 else "target"
+    walk.note(f"{jump.label}: a patrol: the last {last} again and again, until somebody ends it")
     return Patrol(len(before))
 
 
@@ -401,8 +404,8 @@ def _change_speed(item: Item, walk: _Walk) -> None:
     if speed_m_s == -2.0:
         walk.speed_m_s = None
     elif speed_m_s != -1.0:
-        if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):
-            raise ItemError(f"{item.label}: a speed of {speed_m_s:g} m/s")
+        if not 0.0 < speed_m_s <= FASTEST_M_S:
+            raise ItemError(f"{item.label}: a speed of {speed_m_s:g} m/s; give more than 0 and up to {FASTEST_M_S:g}")
         walk.speed_m_s = speed_m_s
     if item.param(3) not in (0.0, -1.0):
         walk.note(f"{item.label}: throttle {item.param(3):g} is not used")

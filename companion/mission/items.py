@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 
 from companion.core.frames import GeoPoint
@@ -11,6 +10,7 @@ from companion.mission import mav_commands as mav
 from companion.mission.tables import swapped_hint
 
 MAX_ITEMS = 100_000
+XML = "is XML (KML, GPX?); load it into a ground station, and save a mission from there"
 
 
 class ItemError(Exception):
@@ -54,13 +54,6 @@ class Item:
     def is_here(self) -> bool:
         """Whether it has no place of its own: to ArduPilot, latitude and longitude 0 are the present place."""
         return self.lat_deg == 0.0 and self.lon_deg == 0.0
-
-
-def number_hint(text: object) -> str:
-    """What to add to the refusal of a text that stands where a number should; empty if it is no number either."""
-    if isinstance(text, str) and re.fullmatch(r"[+-]?\d+,\d+", text):
-        return f"; write {text.replace(',', '.')} with a point"
-    return ""
 
 
 def geo_point(lat_deg: float, lon_deg: float, what: str) -> GeoPoint:

@@ -15,9 +15,10 @@ from pathlib import Path
 from companion.core.frames import GeoPoint
 from companion.mission.fence_items import circle
 from companion.mission.item_interpreter import mission_from_items
-from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
+from companion.mission.items import MAX_ITEMS, XML, Item, ItemError, geo_point
 from companion.mission.mission import Area, Mission, MissionError, open_ring
 from companion.storage.files import read_text
+from companion.storage.validation import quoted_hint
 
 MAX_BYTES = 50_000_000
 
@@ -69,7 +70,9 @@ def _read(path: Path) -> Json:
     except json.JSONDecodeError as error:
         reason = _what_else(text, error.pos) or f"not valid JSON: {error.msg.lower()}"
         raise MissionError(f"{path}: line {error.lineno}: {reason}") from error
-    except (RecursionError, ValueError) as error:
+    except RecursionError as error:
+        raise MissionError(f"{path}: lists within lists, far deeper than a plan has them; save it anew") from error
+    except ValueError as error:
         raise MissionError(f"{path}: not valid JSON: {str(error)[:80]}") from error
     if not isinstance(plan, dict):
         raise MissionError(f"{path}: not a QGroundControl plan")
@@ -81,6 +84,8 @@ def _what_else(text: str, fault: int) -> str:
     whole = text.strip()
     if not whole:
         return "the file is empty"
+    if whole.startswith("<"):
+        return XML
     if whole.startswith("QGC WPL"):
         return f"begins with {reprlib.repr(whole.splitlines()[0])}; end its name in .waypoints"
     if whole.startswith("{") and (fault >= len(text.rstrip()) or not whole.endswith("}")):
@@ -193,16 +198,17 @@ def _list(parent: Json, where: str, *, needed: bool = True) -> list[object]:
 def _expect_version(parent: Json, where: str, version: int) -> None:
     value = parent.get("version")
     if value != version or isinstance(value, bool):
-        raise ItemError(f"{where}: only version {version} is understood, got {reprlib.repr(value)}")
+        got = "there is none" if value is None else f"got {reprlib.repr(value)}"
+        raise ItemError(f"{where}: only version {version} is understood, {got}; save it with a newer QGroundControl")
 
 
 def _real(value: object, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LARGEST:
-        raise ItemError(f"{where}: expected a number, got {reprlib.repr(value)}")
+        raise ItemError(f"{where}: expected a number, got {reprlib.repr(value)}{quoted_hint(value)}")
     return float(value)
 
 
 def _whole(value: object, where: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise ItemError(f"{where}: expected a whole number, got {reprlib.repr(value)}")
+        raise ItemError(f"{where}: expected a whole number, got {reprlib.repr(value)}{quoted_hint(value)}")
     return value

@@ -17,7 +17,7 @@ from companion.core.footprint import Footprint
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission import mav_commands as mav
-from companion.mission.check import LARGEST, check_mission
+from companion.mission.check import FASTEST_M_S, LARGEST, LONGEST_HOLD_S, check_mission
 from companion.mission.do_commands import PARAMETERS, TAKEN, WITH_PLACE, DoCommand, command_of_name, lacking, padded
 from companion.mission.ground_station_reader import load_ground_station_file
 from companion.mission.mission import (
@@ -143,9 +143,9 @@ class TargetTable(PlaceTable):
     """``[[target]]``."""
 
     name: Name | None = None
-    hold_s: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    hold_s: Annotated[float, Field(ge=0.0, le=LONGEST_HOLD_S)] = 0.0
     on_blocked: Literal["skip", "wait", "return", "hold"] = "skip"
-    speed_m_s: Positive | None = None
+    speed_m_s: Annotated[float, Field(gt=0.0, le=FASTEST_M_S)] | None = None
     command: Annotated[list[CommandTable], Field(default_factory=list, max_length=MAX_COMMANDS)]
 
     def target(self, number: int) -> Target:
@@ -217,7 +217,7 @@ class RoverTable(Table):
     length_m: Annotated[float, Field(gt=0.0, le=20.0)] | None = None
     width_m: Annotated[float, Field(gt=0.0, le=20.0)] | None = None
     centre_forward_m: Annotated[float, Field(ge=-10.0, le=10.0)] = 0.0
-    cruise_speed_m_s: Annotated[float, Field(gt=0.0, le=50.0)] = RoverSpec().cruise_speed_m_s
+    cruise_speed_m_s: Annotated[float, Field(gt=0.0, le=FASTEST_M_S)] = RoverSpec().cruise_speed_m_s
     turning_radius_m: Annotated[float, Field(ge=0.0, le=100.0)] = RoverSpec().turning_radius_m
 
     @model_validator(mode="after")

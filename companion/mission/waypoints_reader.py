@@ -17,9 +17,10 @@ from pathlib import Path
 from companion.core.frames import GeoPoint
 from companion.mission import mav_commands as mav
 from companion.mission.item_interpreter import mission_from_items
-from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point, number_hint
+from companion.mission.items import MAX_ITEMS, XML, Item, ItemError, geo_point
 from companion.mission.mission import Mission, MissionError
 from companion.storage.files import read_text
+from companion.storage.validation import number_hint
 
 HEADER = ("QGC", "WPL", "110")
 MAX_BYTES = 20_000_000
@@ -60,8 +61,12 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
 
 def _hint(lines: list[tuple[int, list[str]]]) -> str:
     """What to add where another kind of file has this name."""
-    is_plan = bool(lines) and lines[0][1][0].startswith("{")
-    return "; it seems a plan of QGroundControl; end its name in .plan" if is_plan else ""
+    first = lines[0][1][0] if lines else ""
+    if first.startswith("{"):
+        return "; it seems a plan of QGroundControl; end its name in .plan"
+    if first.startswith("<"):
+        return f"; the file {XML}"
+    return "; save it anew with Mission Planner, MAVProxy or QGroundControl"
 
 
 def _item(words: list[str], position: int) -> Item:

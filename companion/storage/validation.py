@@ -45,6 +45,19 @@ def alike(name: str, known: Iterable[str]) -> str:
     return ""
 
 
+def quoted_hint(value: object) -> str:
+    """What to add to the refusal of a number in quotes; empty for anything else."""
+    quoted = isinstance(value, str) and re.fullmatch(r"[+-]?\d+(\.\d+)?", value.strip())
+    return f"; write {value.strip()} without quotes" if isinstance(value, str) and quoted else ""
+
+
+def number_hint(text: object) -> str:
+    """What to add to the refusal of a text that stands where a number should; empty if it is no number either."""
+    if isinstance(text, str) and re.fullmatch(r"[+-]?\d+,\d+", text):
+        return f"; write {text.replace(',', '.')} with a point"
+    return ""
+
+
 def _described(error: ValidationError, model: type[BaseModel]) -> str:
     place, reason = first_fault(error)
     fault = error.errors(include_url=False)[0]

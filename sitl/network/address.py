@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 
-from sitl.network.endpoint import Endpoint, ListenError, network_address
+from sitl.network.endpoint import LINK_REMEDY, Endpoint, ListenError, network_address
 from sitl.network.event_log import EventLog
 from sitl.network.serial import DEFAULT_BAUD, HIGHEST_BAUD, Device, PseudoTerminal, SerialEndpoint
 from sitl.network.tcp import TcpServer
@@ -17,7 +17,7 @@ TAKEN = "stop the other program, or choose another port with --listen"
 ELSEWHERE = "is that an address of this computer?"
 REMEDIES = {
     "serial": "check that the device exists and that you may use it",
-    "pty": "name a link that does not exist yet, in a folder that does",
+    "pty": LINK_REMEDY,
 }
 
 

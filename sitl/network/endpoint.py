@@ -15,6 +15,9 @@ DATAGRAM_BYTES = 1400
 BACKLOG_BYTES = 1_000_000
 """A TCP client is dropped when this much waits for it."""
 
+LINK_REMEDY = "name a link that does not exist yet, in a folder that does; delete one that a killed simulator left"
+"""What to do where the link to a pseudo-terminal cannot be made."""
+
 
 class ListenError(Exception):
     """An address that cannot be used; the text is one line."""

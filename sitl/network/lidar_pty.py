@@ -11,7 +11,7 @@ import tty
 from collections.abc import Callable
 from pathlib import Path
 
-from sitl.network.endpoint import READ_BYTES, ListenError
+from sitl.network.endpoint import LINK_REMEDY, READ_BYTES, ListenError
 from sitl.sensors.serial_lidar import SerialLidar
 from sitl.simulator import Simulator
 
@@ -36,7 +36,9 @@ class LidarTerminal:
         try:
             self._open()
         except OSError as error:
-            raise ListenError(f"--lidar-pty: {path or device.mounted.make.name}: {error.strerror or error}") from error
+            remedy = f"; {LINK_REMEDY}" if path else ""
+            name = path or device.mounted.make.name
+            raise ListenError(f"--lidar-pty: {name}: {error.strerror or error}{remedy}") from error
 
     def descriptors(self) -> list[int]:
         """The near end, unless the cable is pulled."""

@@ -28,6 +28,7 @@ def test_everything_about_a_mounting() -> None:
         ("C1:/dev/serial/by-path/pci-0:1.0-port0", "/dev/serial/by-path/pci-0:1.0-port0"),
         ("X4:/dev/serial/by-path/pci-0:1.0-port0:flip", "/dev/serial/by-path/pci-0:1.0-port0"),
         ("A1:/dev/ttyS0:", "/dev/ttyS0"),
+        ("LD-06:/dev/ttyS0", "/dev/ttyS0"),
     ],
 )
 def test_ports_with_colons_of_their_own(text: str, port: str) -> None:
@@ -37,7 +38,9 @@ def test_ports_with_colons_of_their_own(text: str, port: str) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("LD1:/dev/ttyUSB0", "'LD1' is no model; models are LD06, LD19, RPLIDAR-A1"),
+        ("R2D2:/dev/ttyUSB0", "'R2D2' is no model; models are LD06, LD19, RPLIDAR-A1 (A1), RPLIDAR-C1 (C1), YDLIDAR"),
+        ("LD19:/dev/x:yav=3", "'yav=3' is no option, did you mean yaw?"),
+        ("LD19:/dev/x:yaw=1,8", "'8' is no option; decimals have a point, 1.8 and not 1,8"),
         ("LD19", "names no port; write MODEL:PORT"),
         ("LD19::yaw=1", "names no port"),
         ("LD19:/dev/x:yaw=north", "yaw=north: give a number from -360 to 360"),

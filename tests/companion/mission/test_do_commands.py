@@ -102,8 +102,8 @@ def test_all_that_no_rover_can_do_is_named_at_once_and_can_be_left_out(tmp_path:
 def test_wrong_values_are_named_with_what_no_rover_can_do(tmp_path: Path) -> None:
     rows = (do(1, 22, lat=1, lon=1), waypoint(2, hold=-5), waypoint(3), do(4, 178, 1, -3), do(5, 82, lat=1, lon=1))
     path = wpl(tmp_path, HOME, *rows)
-    negative = "item 2: NAV_WAYPOINT (16): a hold of -5.0 s; it must not be negative"
-    wrong = f"{negative}; item 4: DO_CHANGE_SPEED (178): a speed of -3 m/s"
+    negative = "item 2: NAV_WAYPOINT (16): a hold of -5 s; it is from 0 to 1000000 s"
+    wrong = f"{negative}; item 4: DO_CHANGE_SPEED (178): a speed of -3 m/s; give more than 0 and up to 50"
     unknown = "item 1: NAV_TAKEOFF (22): no rover can do it; item 5: NAV_SPLINE_WAYPOINT (82): no rover can do it"
     assert refusal(path) == f"{wrong}; {unknown}"
     with pytest.raises(MissionError) as error:

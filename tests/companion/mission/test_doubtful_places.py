@@ -77,6 +77,14 @@ def test_a_latitude_that_cannot_be_is_refused_with_the_hint(tmp_path: Path, text
     assert "\n" not in str(e.value)
 
 
+def test_a_place_that_nobody_told(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text("[[target]]\nlat_deg = 0.0\nlon_deg = 0.0\n")
+    assert doubtful_places(load_mission(path)) == [
+        "target 1 'target 1' is at latitude 0, longitude 0, in the sea; is that meant?"
+    ]
+
+
 def test_what_is_wrong_either_way_gets_no_hint(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_text("[[target]]\nlat_deg = 149.1\nlon_deg = 120.0\n")

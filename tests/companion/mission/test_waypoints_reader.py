@@ -157,7 +157,10 @@ def test_fences_may_stand_after_the_items(tmp_path: Path) -> None:
         ([HOME, *map(waypoint, range(1, 10003))], "this mission is longer than 10000 targets; split it"),
         ([HOME, do(1, 178, 1, 0), waypoint(2)], "speed of 0"),
         ([HOME, do(1, 178, 2, 3), waypoint(2)], "kind 2"),
-        ([HOME, waypoint(1, hold=-1)], "hold of -1.0 s; it must not be negative"),
+        ([HOME, waypoint(1, hold=-1)], "hold of -1 s; it is from 0 to 1000000 s"),
+        ([HOME, waypoint(1, hold=1e30)], "a hold of 1e+30 s"),
+        ([HOME, waypoint(1), do(2, 178, 0, 51)], "a speed of 51 m/s; give more than 0 and up to 50"),
+        ([HOME, waypoint(1), do(2, 183, 1, -5)], "a pulse of -5 µs; it is from 0 (none) to 65535"),
         ([HOME, waypoint(1, lat=91)], "91.0, 23.2 is not a latitude"),
         ([HOME, "1 0 1 16 0 0 0 0 5 5 0 1"], "frame 1 (LOCAL_NED)"),
         ([HOME, waypoint(1), do(2, 112, 5), do(3, 93, 5)], "item 3: NAV_DELAY (93): a delay after a condition"),
@@ -193,7 +196,9 @@ def test_a_crossing_fence_is_refused(tmp_path: Path) -> None:
 
 
 def test_other_headers_and_suffixes_are_refused(tmp_path: Path) -> None:
-    assert "line 1: expected the header" in refusal(wpl(tmp_path, HOME, header="QGC WPL 120"))
+    old = refusal(wpl(tmp_path, HOME, header="QGC WPL 120"))
+    assert "line 1: expected the header" in old and "save it anew with Mission Planner" in old
+    assert "is XML (KML, GPX?)" in refusal(wpl(tmp_path, HOME, header="<kml>"))
     assert refusal(wpl(tmp_path, HOME, header='{"fileType": "Plan",')).endswith("QGroundControl; end its name in .plan")
     (tmp_path / "a.txt").write_bytes(b"\xff\xfe")
     assert "not UTF-8" in refusal(tmp_path / "a.txt")
