@@ -90,7 +90,8 @@ def doctor(
         raise typer.Exit(EXIT_BAD_INPUT) from error
     examination = Surveyor(link, settings.link, (*PARAMETERS, *parameters_of(commands)), signer)
     now_s = began_s = clock.now_s()
-    typer.echo(f"listening on {connect} for up to {seconds:g} s", err=True)
+    if not as_json:
+        typer.echo(f"listening on {connect} for up to {seconds:g} s", err=True)
     try:
         while (not examination.done or wired.wants(now_s - began_s)) and now_s - began_s < seconds:
             examination.step(now_s)

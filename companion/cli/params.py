@@ -56,6 +56,8 @@ def params(
         if write is not None:
             _write(write, wanted, table)
         if check:
+            if connect is not None and not as_json:
+                typer.echo(f"reading parameters on {connect}", err=True)
             reader, place = _read(connect, wanted, StateFiles(state), settings_file, signing_key)
     except (MissionError, SettingsError, OutputError, LinkError, SigningKeyError) as error:
         typer.echo(str(error), err=True)
@@ -103,7 +105,6 @@ def _read(
         link, clock = open_link(connect), WallClock()
         reader = ParameterReader(link, settings, [one.name for one in wanted], signer)
         began_s = now_s = clock.now_s()
-        typer.echo(f"reading parameters on {connect}", err=True)
         try:
             while not reader.done(now_s) and now_s - began_s < (LIMIT_S if reader.rover_heard else HEARD_S):
                 reader.step(now_s)
