@@ -56,9 +56,8 @@ def params(
         if write is not None:
             _write(write, wanted, table)
         if check:
-            if connect is not None and not as_json:
-                typer.echo(f"reading parameters on {connect}", err=True)
-            reader, place = _read(connect, wanted, StateFiles(state), settings_file, signing_key)
+            files = StateFiles(state)
+            reader, place = _read(connect, wanted, files, settings_file, signing_key, quiet=as_json)
     except (MissionError, SettingsError, OutputError, LinkError, SigningKeyError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -96,6 +95,8 @@ def _read(
     files: StateFiles,
     settings_file: Path | None,
     signing_key: Path | None,
+    *,
+    quiet: bool,
 ) -> tuple[ParameterReader, str]:
     """The rover's own values, and where they were asked for. Raises LinkError, SettingsError, SigningKeyError."""
     if connect is None:
@@ -103,6 +104,8 @@ def _read(
     try:
         settings, signer = usable_settings(settings_file).link, files.signer(signing_key)
         link, clock = open_link(connect), WallClock()
+        if not quiet:
+            typer.echo(f"reading parameters on {connect}", err=True)
         reader = ParameterReader(link, settings, [one.name for one in wanted], signer)
         began_s = now_s = clock.now_s()
         try:
