@@ -77,10 +77,15 @@ class MissionRequests:
         return not flood
 
     def _pause(self, now_s: float, vehicle: VehicleState) -> Reason[Refusal] | None:
-        """HOLD, while the companion drives."""
+        """HOLD, while the companion drives. A mission that has not begun is kept from beginning."""
+        if self._run.executor is None:
+            if not self._run.start_paused:
+                self._notifier.tell("Paused on request: the mission does not begin", Severity.WARNING)
+            self._run.start_paused = True
+            return None
         if vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.HOLD:
             return None
-        if self._run.executor is None or not vehicle.is_ours:
+        if not vehicle.is_ours:
             return Reason(Refusal.NOT_DRIVING, (self._run.activity,))
         self._asked_s = now_s
         self._notifier.tell("Paused on request: HOLD", Severity.WARNING)
@@ -90,6 +95,10 @@ class MissionRequests:
     def _go_on(self, now_s: float, vehicle: VehicleState) -> Reason[Refusal] | None:
         """Back to the mode of the mission, from a HOLD that was asked for here."""
         own = vehicle.own_mode
+        if self._run.start_paused:
+            self._run.start_paused = False
+            self._notifier.tell("Going on as requested: the mission may begin", Severity.WARNING)
+            return None
         if vehicle.is_ours or now_s - self._left_s < AGAIN_S:
             return None
         if not self._run.paused:

@@ -78,7 +78,7 @@ class MissionRun:
 
     Each attribute has one writer: the event dispatcher writes ``vehicle`` (after an error, the shutdown), the drive
     permission ``latch``, ``stop`` and ``taken_over``, arming ``awaited``, the shutdown ``end``, the mission requests
-    ``paused``. ``activity`` follows from them.
+    ``paused`` and ``start_paused``. ``activity`` follows from them.
     """
 
     def __init__(
@@ -107,6 +107,8 @@ class MissionRun:
         """Why the run ends; None while it goes on."""
         self.paused = False
         """The autopilot's present HOLD was asked for as a pause."""
+        self.start_paused = False
+        """A pause was asked for before the mission began: it does not begin."""
         self.setpoint_check = SetpointCheck(notifier)
         self._drag = DragWatch()
         self._told: ControlCommand | None = None

@@ -103,7 +103,7 @@ def target_asked(message: Any, time_s: float) -> GoalRequested | None:
         return _refused(time_s, asker, form, RequestAnswer.BAD_FRAME, f"frame {frame} has no latitude and longitude")
     point = _place(message)
     if point is None:
-        return _refused(time_s, asker, form, RequestAnswer.BAD_VALUE, "no latitude and longitude in it")
+        return _refused(time_s, asker, form, RequestAnswer.BAD_VALUE, "no valid latitude and longitude in it")
     if math.isnan(speed_m_s) or speed_m_s in (KEEP_SPEED, 0.0):
         return GoalRequested(time_s, asker, form, point)
     if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):

@@ -227,8 +227,15 @@ def _candidate(problem: PlanningProblem, result: PlanResult, *, part_of: bool) -
     ends = f"field {problem.start[0]}, {problem.start[1]} to {problem.target[0]}, {problem.target[1]}"
     name = f"proposed by {result.planner}" if part_of else f"search by {result.planner}, {ends}"
     along = None if path is None or path.curve is None else float(curve_cost(plain(problem.weights), path.curve))
-    note = ", ".join(part for part in (result.status.value, work) if part)
+    note = ", ".join(part for part in (result.status.value, _whose(result), work) if part)
     return Candidate(name, note, path, math.inf if path is None else path.cost, along, part_of, problem)
+
+
+def _whose(result: PlanResult) -> str:
+    """Whose proposal ``hybrid`` answers with; empty for other planners and without a path."""
+    if result.planner != Hybrid.name or result.path is None:
+        return ""
+    return "the genetic curve" if result.control_points else "the graph's path, made smooth"
 
 
 def explanation_lines(why: Explanation) -> list[str]:

@@ -56,7 +56,7 @@ class ReplayResult:
 class RecordPlayer:
     """Plays a record tick by tick: it is the link, the clock and the log of the companion that is run again."""
 
-    description = "record"
+    description = "the recorded link"
     problem = ""
 
     def __init__(

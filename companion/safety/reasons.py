@@ -87,6 +87,7 @@ class WaitReason(Enum):
     CHARGED_BATTERY = "a charged battery ({})"
     ROOM_TO_BORDER = "the rover to stand {}"
     ON_THE_GRID = "the rover to stand on the mission's grid"
+    REQUEST_TO_BEGIN = "a person to ask it to go on (a pause was asked for before the mission began)"
     GUIDED = "GUIDED (asked for)"
     ARMING = "arming (asked for; the autopilot says if it refuses)"
     PERSON_STARTS_AUTO = "a person to arm and to set AUTO (the autopilot drives this mission)"
@@ -102,6 +103,7 @@ class WaitReason(Enum):
 
 
 FOR_A_PERSON = frozenset((
+    WaitReason.REQUEST_TO_BEGIN,
     WaitReason.PERSON_STARTS_AUTO,
     WaitReason.PERSON_SETS_GUIDED,
     WaitReason.PERSON_SETS_GUIDED_AGAIN,

@@ -169,6 +169,7 @@ class Arming:
     def _look(self, vehicle: VehicleState, now_s: float) -> Cleared | None:
         self._check(vehicle, now_s)
         hindrance = self._limits.awaited(now_s, left_driving=self._left_driving()) or self._too_near(vehicle, now_s)
+        hindrance = Reason(WaitReason.REQUEST_TO_BEGIN) if self._run.start_paused else hindrance
         control = Control.PERSON if self._had_by_person(vehicle) else self._whose(vehicle)
         # A person who disarms the rover does not want it armed again by itself.
         self._arm = self._arm and not (vehicle.heartbeat is not None and vehicle.heartbeat.armed)

@@ -62,6 +62,8 @@ PLAIN_ENDS = (EndReason.DONE, EndReason.STOPPED_BY_USER)
 NOT_REACHED = {TargetStatus.PENDING: "not reached"}
 NEWEST_S = 0.5
 """A scan or a planned motion that is older is not shown."""
+KNOWN_S = 2.0
+"""A figure that goes by an older position is not known."""
 STATES = {
     RunPhase.CONNECTING: "connecting",
     RunPhase.WAITING: "waiting",
@@ -115,7 +117,7 @@ def frame_of(companion: Companion, status: Status, headway: Headway | None = Non
         "kind": "frame",
         "t": round(now_s, 2),
         "pose": None if pose is None else [*_place(pose.point), round(pose.heading_rad, 4)],
-        "speed": None if vehicle.position is None else round(vehicle.forward_m_s, 3),
+        "speed": round(vehicle.forward_m_s, 3) if is_known(vehicle, now_s) else None,
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
         **mode_of(vehicle, run),
         **doing_of(companion, status, headway),
@@ -132,9 +134,14 @@ def frame_of(companion: Companion, status: Status, headway: Headway | None = Non
         "gps": _gps(vehicle),
         "decision": 0 if executor is None else executor.decisions,
         "guard": None if executor is None else vehicle.guard_at(now_s) is not None,
-        "paused": run.paused,
+        "paused": run.paused or run.start_paused,
         "news": news_of(status),
     }
+
+
+def is_known(vehicle: VehicleState, now_s: float) -> bool:
+    """Whether the newest position is new enough to say how fast the rover is now, and how near to something."""
+    return vehicle.position is not None and now_s - vehicle.position.time_s <= KNOWN_S
 
 
 def news_of(status: Status, headway: Headway | None = None) -> list[Json]:
@@ -362,7 +369,7 @@ def _figures(companion: Companion, status: Status) -> Json:
     ticks = companion.outcome.tick_seconds
     searches_s = [] if executor is None else executor.driver.searcher.seconds
     clear_m = None
-    if executor is not None and pose is not None:
+    if executor is not None and pose is not None and is_known(run.vehicle, status.time_s):
         room_m = clearance_m(executor.evidence, pose.point, CLEARANCE_M) - run.mission.rover.footprint.inscribed_m
         clear_m = round(max(room_m, 0.0), 2)
     return {

@@ -25,6 +25,7 @@ FORMS = {
     "skip": RequestForm.SKIP,
     "goto": RequestForm.COMMAND,
 }
+NOT_HEARD = "no autopilot has been heard yet"
 NOT_DRIVING = "the mission has not begun"
 TOO_OLD = "it came too late: the page shows what was seconds ago"
 NOT_CHANGED = "the autopilot has not changed its mode"
@@ -106,10 +107,10 @@ class PageRequests:
 
     def _confirm(self, companion: Companion) -> None:
         """Tell of modes that have been changed, and of those that were not."""
-        vehicle = companion.vehicle
+        vehicle, waits = companion.vehicle, companion.mission_run.start_paused
         for asked in tuple(self._unconfirmed):
             holds = vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.HOLD
-            changed = holds if asked.action == "pause" else vehicle.is_ours
+            changed = holds or waits if asked.action == "pause" else vehicle.is_ours or companion.executor is None
             if changed or stopwatch_s() - asked.since_s > CONFIRMED_S:
                 self._unconfirmed.remove(asked)
                 self._answer(asked.number, asked.action, "" if changed else NOT_CHANGED)
@@ -118,6 +119,8 @@ class PageRequests:
         """Why a request is not passed on, in words; empty if it is."""
         if action == "resume" and companion.mission_run.is_driving:
             return NOT_PAUSED
+        if companion.vehicle.heartbeat is None:
+            return NOT_HEARD
         if action in MODES:
             self._station.pause(action == "pause")
             return ""

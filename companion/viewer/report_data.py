@@ -243,6 +243,8 @@ def _candidate(candidate: Candidate, why: Explanation, steady: SteadyFrame) -> J
         "name": candidate.name,
         "note": candidate.note,
         "cost": None if not math.isfinite(candidate.cost) else round(candidate.cost, 3),
+        "along": None if candidate.curve_cost is None else round(candidate.curve_cost, 3),
+        "part": candidate.part_of,
         "taken": taken,
         "cells": []
         if path is None

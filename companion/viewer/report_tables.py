@@ -119,7 +119,7 @@ def _figures(run: Run) -> Json:
         ["driven", f"{tally.driven_m:.1f} m"],
         ["of that backwards", f"{tally.backwards_m:.1f} m"],
         ["mean speed while moving", f"{mean:.2f} m/s"],
-        ["stopped on the way", f"{tally.stopped_s:.1f} s, {tally.stops} time{'s' * (tally.stops != 1)}"],
+        ["stopped, held up not counted", f"{tally.stopped_s:.1f} s, {tally.stops} time{'s' * (tally.stops != 1)}"],
         ["energy from the battery", _with_unit(energy, 2, "Wh")],
         ["charge from the battery", _with_unit(charge, 3, "Ah")],
         ["energy for each km", _with_unit(per_km, 1, "Wh")],

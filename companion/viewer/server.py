@@ -113,7 +113,8 @@ class WebApp:
             await socket.close(DENIED)  # before it is accepted: the browser gets a 403
             return
         await socket.accept()
-        with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError):
+        # KeyError: bytes where text is wanted.
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError, asyncio.TimeoutError, KeyError):
             may_act = await self._greeted(socket)
             if may_act is None:
                 return
@@ -286,7 +287,7 @@ def _host_of(header: str) -> str:
 
 
 def _same(given: str, token: str) -> bool:
-    return hmac.compare_digest(given.encode(), token.encode())
+    return hmac.compare_digest(given.encode(errors="replace"), token.encode())
 
 
 def _message(text: str) -> dict[str, Any]:

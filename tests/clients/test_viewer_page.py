@@ -369,7 +369,7 @@ def test_a_report_plays_from_its_file_to_its_end(report_file: Path) -> None:
         report.shows("Done")
         assert report.run("return document.title") == title, "a report keeps the title of its file"
         report.press("What the signs mean (L)")
-        report.shows("stop on the way")
+        report.shows("stop, or held up on the way")
         report.press("What the signs mean (L)")
         report.press("Now")
         report.resize(PHONE)

@@ -69,7 +69,7 @@ export class Charts {
             splits: (each) => this.splits(each),
             values: (each, marks) => marks.map((t) => this.mark(each, t)),
           },
-          { ...axis, size: 34, space: 26, gap: 3 },
+          { ...axis, size: (_, texts) => widthOf(texts), space: 26, gap: 3 },
         ],
         series: [{}, { stroke: () => theme.colours.accent, width: 2, points: { show: false }, spanGaps: false }],
         hooks: { draw: [(each) => this.drawNow(each)], setCursor: [(each) => this.showValue(part, each.cursor.idx)] },
@@ -135,6 +135,11 @@ export class Charts {
     this.version = this.model.figures.version;
     for (const part of this.parts) part.plot?.setData(this.model.figures.series(part.index));
   }
+}
+
+// Room for the longest mark of the axis at the left.
+function widthOf(texts) {
+  return Math.max(34, 10 + 7 * Math.max(0, ...(texts ?? []).map((text) => text.length)));
 }
 
 /** What stands above a chart: the value `pointed` at, else that of now. After the end there is none. */

@@ -7,6 +7,10 @@ import { clock, number } from "viewer/words.js";
 /** So many rows around the current one are in the page; a long drive has thousands of decisions. */
 const ROWS = 120;
 
+const WHY =
+  "Proposals are not chosen themselves. The search answers with one of them: with the genetic curve, unless the " +
+  "graph's path, made smooth, costs less along its curve. What it answers with is compared with the current path by cost.";
+
 export class Decisions {
   constructor(record, jump) {
     Object.assign(this, { record, jump, current: -1, hovered: null, from: -1, rows: [] });
@@ -89,17 +93,19 @@ export class Decisions {
           onmouseleave: () => this.hover(null),
         },
         make("td", {}, make("span", { class: "letter" }, letter(i))),
-        make("td", {}, one.name),
-        make("td", {}, one.note ?? ""),
-        make("td", { class: "right" }, one.cost === null ? "–" : number(one.cost, 2)),
+        make("td", { class: one.part ? "proposal" : null }, one.name, make("div", { class: "note" }, one.note ?? "")),
+        make("td", { class: "right" }, costText(one.cost)),
+        make("td", { class: "right" }, costText(one.along)),
         make("td", {}, one.taken ? "taken" : ""),
       );
-    return make(
+    const head = ["", "candidate", "cost", "curve", ""].map((name) => make("th", {}, name));
+    const table = make(
       "table",
       { class: "candidates" },
-      make("thead", {}, make("tr", {}, ...["", "candidate", "", "cost", ""].map((name) => make("th", {}, name)))),
+      make("thead", {}, make("tr", {}, ...head)),
       make("tbody", {}, ...candidates.map(row)),
     );
+    return make("div", {}, table, ...(candidates.some((one) => one.part) ? [make("p", { class: "nothing" }, WHY)] : []));
   }
 
   hover(index) {
@@ -178,6 +184,10 @@ export class Decisions {
     const [size, weight] = strong ? [15, 800] : [13, 650];
     pen.label(text, x, y, 9, { size, weight, colour: colourOf(pen, i) });
   }
+}
+
+function costText(cost) {
+  return Number.isFinite(cost) ? number(cost, 2) : "–";
 }
 
 function colourOf(pen, index) {

@@ -4,6 +4,7 @@ import { Actions } from "viewer/actions.js";
 import { Camera } from "viewer/camera.js";
 import { Charts } from "viewer/charts.js";
 import { addFiguresButton } from "viewer/figures_button.js";
+import { isLost, silence } from "viewer/freshness.js";
 import { listen, listenKeys } from "viewer/gestures.js";
 import { Link } from "viewer/link.js";
 import { MapView } from "viewer/map_view.js";
@@ -17,10 +18,6 @@ import { lasting } from "viewer/words.js";
 /** Frames come five a second. Without one for as long as this, what is shown is old. */
 const STALE_MS = 1500;
 const LOOK_MS = 250;
-/** The autopilot's heartbeat comes once a second. Without one for as long as this, its data is old. */
-const SILENT_S = 3.5;
-/** Positions come several times a second. Without one for as long as this, place and speed are old. */
-const OLD_POSITION_S = 1.5;
 
 class LivePage {
   constructor(root) {
@@ -119,7 +116,7 @@ class LivePage {
     const { viewer, headline, legend } = this.parts;
     const { scene, frame } = this.model;
     const trouble = this.trouble();
-    const lost = frame?.state !== "ended" && frame?.rates?.position_age_s > OLD_POSITION_S;
+    const lost = isLost(frame);
     const old = frame !== null && this.silentFor() > STALE_MS;
     const silent = trouble !== "" || old;
     this.charts.stale = lost || silent;
@@ -145,9 +142,7 @@ class LivePage {
     if (this.denied) return "Not connected: a token is needed";
     const silent = this.silentFor();
     if (this.model.frame?.state === "ended") return "";
-    const heartbeat = this.model.frame?.rates?.heartbeat_age_s;
-    if (silent < STALE_MS && heartbeat > SILENT_S) return `Autopilot silent for ${lasting(heartbeat)}`;
-    if (silent < STALE_MS) return "";
+    if (silent < STALE_MS) return silence(this.model.frame);
     const time = lasting(silent / 1000);
     if (this.link?.open) return this.model.frame ? `No data for ${time}` : "";
     return `${this.why || "No connection"} for ${time}`;

@@ -5,6 +5,7 @@ import { Charts } from "viewer/charts.js";
 import { Decisions } from "viewer/decisions.js";
 import { make } from "viewer/dom.js";
 import { addFiguresButton } from "viewer/figures_button.js";
+import { isLost, silence } from "viewer/freshness.js";
 import { listen, listenKeys } from "viewer/gestures.js";
 import { MapView } from "viewer/map_view.js";
 import { Model } from "viewer/model.js";
@@ -100,7 +101,7 @@ class ReportPage {
     keys["]"] = () => this.decisions.step(this.playback.t, 1);
     keys[","] = () => this.jump(this.playback.t - SECOND_STEP_S);
     keys["."] = () => this.jump(this.playback.t + SECOND_STEP_S);
-    legend.addSign("halted", "stop on the way");
+    legend.addSign("halted", "stop, or held up on the way");
     legend.addKeys(", Space play, , and . a second back or on, [ and ] decision before or after");
     listenKeys(this.parts.canvas, this.camera, keys);
   }
@@ -123,8 +124,12 @@ class ReportPage {
     const now = performance.now();
     if (this.playback.playing && now - this.shownAt < PANEL_MS) return;
     this.shownAt = now;
+    const { scene, frame } = this.model;
     const cut = this.record.scene.cut && this.playback.t >= this.record.end;
-    this.parts.headline.show(this.model.scene, this.model.frame, cut ? "The record ends here: it was cut short" : "");
+    const silent = silence(frame);
+    this.parts.viewer.classList.toggle("stale", silent !== "" || isLost(frame));
+    this.parts.viewer.classList.toggle("lost", silent === "" && isLost(frame));
+    this.parts.headline.show(scene, frame, cut ? "The record ends here: it was cut short" : silent);
     this.panel.show();
     this.decisions.show(this.playback.t);
     this.charts.show();

@@ -129,9 +129,12 @@ def test_a_hold_or_another_mode_that_was_not_asked_for_here_is_not_left(tmp_path
     assert asked.pause() == (NOT_NOW, []), "the pilot drives"
 
 
-def test_before_the_mission_begins_nothing_is_paused_or_skipped(tmp_path: Path) -> None:
+def test_before_the_mission_begins_a_pause_keeps_it_from_beginning_and_nothing_is_skipped(tmp_path: Path) -> None:
     asked = Asked(tmp_path, begun=False)
-    assert asked.pause() == (NOT_NOW, []) and asked.skip_to(1) is NOT_NOW
+    assert asked.pause() == (OK, []) and asked.run.start_paused and asked.skip_to(1) is NOT_NOW
+    asked.in_mode(RoverMode.HOLD)
+    assert asked.pause() == (OK, []) and asked.run.start_paused, "whatever the mode"
+    assert asked.go_on() == (OK, []) and not asked.run.start_paused
 
 
 def test_only_the_target_after_this_one_may_be_next(tmp_path: Path) -> None:

@@ -82,6 +82,11 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (WaitReason.CHARGED_BATTERY, (LOW,), "a charged battery (battery at 12 %)"),
     (WaitReason.ROOM_TO_BORDER, ("2 m away",), "the rover to stand 2 m away"),
     (WaitReason.ON_THE_GRID, (), "the rover to stand on the mission's grid"),
+    (
+        WaitReason.REQUEST_TO_BEGIN,
+        (),
+        "a person to ask it to go on (a pause was asked for before the mission began)",
+    ),
     (WaitReason.GUIDED, (), "GUIDED (asked for)"),
     (WaitReason.ARMING, (), "arming (asked for; the autopilot says if it refuses)"),
     (WaitReason.PERSON_STARTS_AUTO, (), "a person to arm and to set AUTO (the autopilot drives this mission)"),

@@ -174,6 +174,10 @@ def test_what_else_is_awaited_keeps_it_from_guided(tmp_path: Path) -> None:
     start.limits.hindrance = Reason(WaitReason.OTHER_COMPANION_SIGNS)
     assert start.step(HOLD, armed=False) is WaitReason.OTHER_COMPANION_SIGNS and start.autopilot.taken() == []
     assert start.limits.left_driving is False
+    start.limits.hindrance, start.run.start_paused = None, True
+    assert start.step(HOLD, armed=False) is WaitReason.REQUEST_TO_BEGIN and start.autopilot.taken() == []
+    start.run.start_paused = False
+    assert start.step(HOLD, armed=False) is WaitReason.GUIDED
 
 
 def test_where_the_autopilot_is_listened_for_is_said(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from companion.recording.recorder import Recorder
 from companion.replay.replay import replay
 from companion.settings.settings_file import parse_settings
 from companion.viewer import page_requests
-from companion.viewer.page_requests import NOT_DRIVING, NOT_PAUSED, OTHER_GOAL, TOO_OLD, PageRequests
+from companion.viewer.page_requests import NOT_DRIVING, NOT_HEARD, NOT_PAUSED, OTHER_GOAL, TOO_OLD, PageRequests
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 from tests.companion.viewer.test_feed import MISSION
@@ -73,10 +73,14 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Page:
 
 @pytest.mark.thorough
 def test_pause_go_on_send_and_skip_and_the_record_is_replayed(page: Page) -> None:
-    page.ticks(0.1)
+    page.ticks(2.0)
     assert page.ask("skip", goal="far end") == page.ask("goto", place=[1.0, 1.0]) == NOT_DRIVING
-    page.drives()
     companion = page.run.companion
+    assert page.ask("pause") == ""
+    page.ticks(60.0)
+    assert companion.executor is None and "asked for before the mission began" in companion.status().doing
+    assert page.ask("resume") == ""
+    page.drives()
     assert page.ask("resume") == NOT_PAUSED
     assert page.ask("pause") == ""
     page.ticks(3.0)
@@ -114,6 +118,9 @@ def test_in_a_drive_that_goes_faster_the_same_delay_is_no_fault(page: Page) -> N
 
 def test_what_nobody_answers_is_told_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page = Page(tmp_path / "record")
+    page.requests.take({"number": 6, "action": "pause"}, page.run.companion)
+    assert [answer["text"] for answer in page.requests.answered(page.run.companion)] == [NOT_HEARD]
+    page.ticks(2.0)
     page.requests.take({"number": 7, "action": "pause"}, page.run.companion)
     assert page.requests.answered(page.run.companion) == []
     monkeypatch.setattr(page_requests, "NO_ANSWER_S", -1.0)

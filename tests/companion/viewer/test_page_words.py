@@ -397,3 +397,16 @@ tell([
     assert left == pytest.approx([20.0, 19.8, 18.9, 17.6], abs=0.01)
     assert beside == pytest.approx(39.6, abs=0.1), "the near part of the path counts, not a later one"
     assert (at_end, without_pose, without_path) == (1, 41, [])
+
+
+def test_a_frame_says_itself_how_old_it_is(tmp_path: Path) -> None:
+    script = """
+const { silence, isLost } = await import("./freshness.js");
+const at = (heartbeat, position, state = "driving") =>
+  ({ state, rates: { heartbeat_age_s: heartbeat, position_age_s: position } });
+const all = [null, {}, at(1, 0.2), at(5, 5), at(1, 2), at(9, 9, "ended")];
+tell([all.map(silence), all.map((frame) => Boolean(isLost(frame)))]);
+"""
+    silent, lost = ran(tmp_path, DOCUMENT + script)
+    assert silent == ["", "", "", "Autopilot silent for 5 s", "", ""]
+    assert lost == [False, False, False, True, True, False]
