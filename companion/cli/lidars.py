@@ -11,9 +11,11 @@ from companion.lidar.spec import FORM, LidarError, LidarSpec, parsed
 from companion.mavlink.port_users import same_device
 from companion.mavlink.transport import device_of
 
+SPACED = FORM.replace(",", ", ")
+"""With places where a narrow terminal may begin a new line."""
 LidarOption = Annotated[
     list[str] | None,
-    typer.Option("--lidar", metavar="SPEC", help=f"A lidar on a serial port of this computer: {FORM}; repeatable."),
+    typer.Option("--lidar", metavar="SPEC", help=f"A lidar on a serial port of this computer: {SPACED}; repeatable."),
 ]
 
 

@@ -50,6 +50,8 @@ def params(
     input.
     """
     try:
+        if not check and (connect is not None or as_json):
+            raise OutputError("params: --connect and --json go with --check, which compares with the rover's")
         rover = RoverSpec() if mission_file is None else load_mission(mission_file, simulated=False).rover
         table = wanted_parameters(rover.cruise_speed_m_s)
         wanted = for_rover(table, guard=guard, station=station)

@@ -32,7 +32,7 @@ NEEDS: Mapping[int, Needed] = MappingProxyType(
         211: Needed("GRIP_ENABLE", "gripper"),
         216: Needed("SPRAY_ENABLE", "sprayer"),
         **dict.fromkeys((202, 203, 206, 531, 532, 534, 2000, 2001, 2500, 2501), Needed("CAM1_TYPE", "camera")),
-        **dict.fromkeys((195, 197, 201, 204, 205, 1000), Needed("MNT1_TYPE", "gimbal")),
+        **dict.fromkeys((195, 197, 198, 201, 204, 205, 1000, 1001), Needed("MNT1_TYPE", "gimbal")),
     }
 )
 

@@ -75,7 +75,7 @@ def parsed(text: str, port: str = "") -> LidarSpec:
     if "=" in port:
         raise LidarError(f"lidar '{text}': one colon stands before all options, and commas between them: {FORM}")
     mounting, given = Mounting(model.min_m, model.max_m), set[str]()
-    for option in filter(None, options.split(",")):
+    for option in filter(None, map(str.strip, options.split(","))):
         mounting, key = _with_option(mounting, option, model, text), option.partition("=")[0]
         if key in given and key != "mask":
             raise LidarError(f"lidar '{text}': {key} is given twice; once is enough")

@@ -399,7 +399,8 @@ def _command(item: Item, walk: _Walk) -> None:
 def _change_speed(item: Item, walk: _Walk) -> None:
     """p1: kind (air and ground speed are the same to a rover), p2: m/s (-1 unchanged, -2 default), p3: throttle."""
     if item.param(1) not in (0.0, 1.0):
-        raise ItemError(f"{item.label}: speed of kind {item.param(1):g} is not for a rover")
+        walk.refuse(item, f"a speed of kind {item.param(1):g} is not for a rover")
+        return
     speed_m_s = item.param(2)
     if speed_m_s == -2.0:
         walk.speed_m_s = None

@@ -61,6 +61,7 @@ def test_what_is_not_for_this_rover_is_a_comment(tmp_path: Path) -> None:
             ["--write", "nowhere/rover.param"],
             "nowhere/rover.param: there is no folder nowhere; make it, or name another",
         ),
+        (["--connect", "udpin:127.0.0.1:1"], "--connect and --json go with --check"),
         (["--check"], "name the rover with --connect"),
         (["--mission", "none.toml"], "none.toml"),
         (["--check", "--connect", "bluetooth:1"], "is not a link"),

@@ -19,6 +19,7 @@ def test_everything_about_a_mounting() -> None:
     where = "yaw=-90,x=0.2,y=-0.1,flip,mask=170..190,mask=350..10"
     text = f"rplidar_c1:/dev/ttyUSB0:{where},min=0.3,max=8,intensity=10,empty=0"
     masked_deg = (170.0, 190.0), (350.0, 10.0)
+    assert parsed(text) == parsed(text.replace(",", ", "))
     assert parsed(text).mounting == Mounting(0.3, 8.0, -90.0, 0.2, -0.1, True, masked_deg, 10, 0.0, True)
 
 

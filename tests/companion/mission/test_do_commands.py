@@ -99,6 +99,15 @@ def test_all_that_no_rover_can_do_is_named_at_once_and_can_be_left_out(tmp_path:
     assert mission.notes[0] == "left out: items 1, 4: NAV_TAKEOFF (22): no rover can do it"
 
 
+def test_a_climb_speed_is_left_out_like_what_no_rover_can_do(tmp_path: Path) -> None:
+    path = wpl(tmp_path, HOME, waypoint(1), do(2, 178, 2, 3), waypoint(3), do(4, 198, 7))
+    assert refusal(path).startswith("item 2: DO_CHANGE_SPEED (178): a speed of kind 2 is not for a rover; --skip-")
+    mission = load_mission(path, skip_unknown=True)
+    assert (
+        names(mission) == ["waypoint 1", "waypoint 3"] and mission.targets[1].commands[0].name == "DO_SET_ROI_SYSID 7 0"
+    )
+
+
 def test_wrong_values_are_named_with_what_no_rover_can_do(tmp_path: Path) -> None:
     rows = (do(1, 22, lat=1, lon=1), waypoint(2, hold=-5), waypoint(3), do(4, 178, 1, -3), do(5, 82, lat=1, lon=1))
     path = wpl(tmp_path, HOME, *rows)
