@@ -231,7 +231,7 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows(f"Leave out {name}?")
             fits(desktop, PHONE)
             desktop.press("Cancel")
-            assert desktop.run("return window.camera.coveredRight") < 80, "one column of buttons"
+            desktop.until(lambda: desktop.run("return window.camera.coveredRight") < 80)  # one column of buttons
             zooms(desktop, lambda: desktop.spread("canvas.map", 30, 90))
             assert desktop.run(STRUCK) == []
             desktop.run(LOSE_PLACE)

@@ -64,7 +64,7 @@ HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
     ),
     "a number of 5000 digits": ("m.toml", lambda: mission_with(f"name = {'9' * 5000}"), "not valid TOML"),
     "nested without end": ("m.toml", lambda: b"a = " + b"[" * 100_000, "nested too deeply"),
-    "a plan nested without end": ("m.plan", lambda: b"[" * 1_000_000, "not valid JSON"),
+    "a plan nested without end": ("m.plan", lambda: b"[" * 1_000_000, "lists within lists"),
     "a number of 5000 digits in a plan": ("m.plan", lambda: b'{"fileType": ' + b"9" * 5000 + b"}", "not valid JSON"),
     "settings nested without end": ("s.toml", lambda: b"a = " + b"[" * 100_000, "not valid TOML"),
     "settings of 5000 digits": ("s.toml", lambda: b"a = " + b"9" * 5000, "not valid TOML"),
