@@ -44,17 +44,18 @@ def test_quiet_it_says_nothing(tmp_path: Path) -> None:
     mission.write_text("[grid]\nsize = [20, 20]\nhome = [1, 1]\n[[target]]\nfield = [9, 9]\n")
     port = free_port()
     with process("sitl", "serve", mission, "--quiet", "--listen", f"tcp:127.0.0.1:{port}") as child:
-        wait_until(lambda: can_connect(port))
+        wait_until(lambda: serves(port))
         child.send_signal(signal.SIGTERM)
         assert finished(child) == (0, "", "")
 
 
-def can_connect(port: int) -> bool:
+def serves(port: int) -> bool:
+    """Whether packets come: a port can be connected to before anybody serves it."""
     try:
-        socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
+        with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as client:
+            return bool(client.recv(1))
     except OSError:
         return False
-    return True
 
 
 def test_a_page_shows_the_simulator_and_ends_with_it(tmp_path: Path) -> None:

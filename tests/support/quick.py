@@ -25,5 +25,5 @@ def _marked(case: Any, several: bool) -> Any:
 
 
 def examples(count: int) -> int:
-    """How many examples a property is tried with: two fifths, and all where there is time for them."""
-    return count if os.environ.get("ALL_EXAMPLES") else max(1, 2 * count // 5)
+    """How many examples a property is tried with: a third, and all where there is time for them."""
+    return count if os.environ.get("ALL_EXAMPLES") else max(1, count // 3)
