@@ -83,13 +83,16 @@ class MissionRequests:
                 self._notifier.tell("Paused on request: the mission does not begin", Severity.WARNING)
             self._run.start_paused = True
             return None
-        if vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.HOLD:
+        silent = _is_silent(vehicle, now_s)
+        if not silent and vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.HOLD:
             return None
         if not vehicle.is_ours:
             return Reason(Refusal.NOT_DRIVING, (self._run.activity,))
         self._asked_s = now_s
-        self._notifier.tell("Paused on request: HOLD", Severity.WARNING)
         self._run.sender.send(SetMode(RoverMode.HOLD), now_s)
+        if silent:
+            return Reason(Refusal.HOLD_NOT_HEARD)
+        self._notifier.tell("Paused on request: HOLD", Severity.WARNING)
         return None
 
     def _go_on(self, now_s: float, vehicle: VehicleState) -> Reason[Refusal] | None:
@@ -103,10 +106,9 @@ class MissionRequests:
             return None
         if not self._run.paused:
             return Reason(Refusal.NOT_PAUSED, (own.name,))
-        heartbeat = vehicle.heartbeat
-        if heartbeat is None or now_s - heartbeat.time_s > FRESH_S:
+        if _is_silent(vehicle, now_s):
             return Reason(Refusal.NOT_HEARD)
-        if not heartbeat.armed:
+        if vehicle.heartbeat is not None and not vehicle.heartbeat.armed:
             return Reason(Refusal.DISARMED)
         self._left_s = now_s
         self._notifier.tell(f"Going on as requested: {own.name}", Severity.WARNING)
@@ -148,3 +150,8 @@ class MissionRequests:
             answer = RequestAnswer.NOT_NOW if refused.kind is Refusal.NOT_DRIVING else RequestAnswer.DENIED
             reason = str(refused)
         self._run.sender.send(AnswerRequest(asker, form, answer, reason), now_s)
+
+
+def _is_silent(vehicle: VehicleState, now_s: float) -> bool:
+    """Whether the autopilot is not heard: nobody knows then what it does."""
+    return vehicle.heartbeat is None or now_s - vehicle.heartbeat.time_s > FRESH_S

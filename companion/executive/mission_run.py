@@ -77,8 +77,8 @@ class MissionRun:
     """What all parts of the companion share of a run.
 
     Each attribute has one writer: the event dispatcher writes ``vehicle`` (after an error, the shutdown), the drive
-    permission ``latch``, ``stop`` and ``taken_over``, arming ``awaited``, the shutdown ``end``, the mission requests
-    ``paused`` and ``start_paused``. ``activity`` follows from them.
+    permission ``latch``, ``stop`` and ``taken_over``, arming ``awaited`` and ``laid``, the shutdown ``end``, the
+    mission requests ``paused`` and ``start_paused``. ``activity`` follows from them.
     """
 
     def __init__(
@@ -99,6 +99,8 @@ class MissionRun:
         """None until the mission has begun."""
         self.awaited: Reason[WaitReason] | None = None
         """What arming waits for; None before it has looked."""
+        self.laid: MissionLayout | None = None
+        """Where the mission lies, as arming has found before it begins; None before that is known."""
         self.stop: Stop | None = None
         """Why the rover was not to be driven in the last tick; None if it was."""
         self.taken_over = False
@@ -131,6 +133,11 @@ class MissionRun:
             return Activity(self.executor.phase)
         phase = RunPhase.STOPPED if self.stop.awaited is None else RunPhase.STOPPED_AND_WAITING
         return Activity(phase, self.stop.reason, self.stop.awaited)
+
+    @property
+    def layout(self) -> MissionLayout | None:
+        """Where the mission lies; None before that is known."""
+        return self.laid if self.executor is None else self.executor.layout
 
     @property
     def told(self) -> ControlCommand | None:

@@ -22,6 +22,8 @@ from companion.vehicle.commands import StatusText
 
 NOT_FOLLOWED_S = 5.0
 """People are told when the autopilot's read-back has shown another target for this long."""
+SILENT_S = 3.0
+"""Without a heartbeat for so long the autopilot is silent."""
 FAULT_AFTER_S = 5.0
 """A message rate that is too low for a moment is not told."""
 TICKS_KEPT = 100_000
@@ -125,7 +127,10 @@ class Notifier:
             self._followed_s = now_s
         elif now_s - self._followed_s > NOT_FOLLOWED_S:
             self.once("The autopilot follows another target than the one sent: does another program steer it?")
-        for text in self.lasting_faults(self._autopilot.rate_faults, problems, now_s):
+        heartbeat = run.vehicle.heartbeat
+        silent = heartbeat is None or now_s - heartbeat.time_s > SILENT_S  # then everything is missing
+        rates = () if silent else self._autopilot.rate_faults
+        for text in self.lasting_faults(rates, problems, now_s):
             self.once(text)
 
     def lasting_faults(self, rates: tuple[RateFault, ...], problems: tuple[str, ...], now_s: float) -> list[str]:

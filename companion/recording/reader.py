@@ -121,7 +121,7 @@ def load_record(directory: Path) -> Record:
     mission, settings = _mission_and_settings(directory, meta)
     cut = [line for name in _logs(meta) if (line := _check_length(directory / name, meta))]
     if meta.end is None:
-        reason = "killed, power lost or the disk full"
+        reason = "killed, power lost, the disk full, or the run still goes on"
         cut = [f"{directory}: the record was not closed ({reason}); what there is of it is replayed"]
     _check_ticks(directory / TICKS)
     decisions = _content(directory / DECISIONS).decode(errors="replace").split("\n")[:-1]

@@ -164,6 +164,7 @@ class Refusal(Enum):
     OBSTACLE_SEEN = "an obstacle was seen there"
     NOT_PAUSED = "it was not paused by a request: set {} with ground station or transmitter"
     NOT_HEARD = "the autopilot is not heard"
+    HOLD_NOT_HEARD = "HOLD was sent, but the autopilot is not heard: take the rover over if it moves"
     DISARMED = "the rover is disarmed"
     LEGS_OF_AUTO = "AUTO says which target is next"
     NOT_NEXT = "only the target after this one may be next"

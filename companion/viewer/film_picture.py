@@ -230,7 +230,8 @@ class FilmPicture:
         width = self._section.width
         pen.rectangle((0, top, width, top + BAR_PIXELS), back)
         whole_s = int(frame["t"])
-        figures = f"{abs(frame['speed']):.1f} m/s   {whole_s // 60}:{whole_s % 60:02d}"
+        speed = "-" if frame["speed"] is None else f"{abs(frame['speed']):.1f}"
+        figures = f"{speed} m/s   {whole_s // 60}:{whole_s % 60:02d}"
         middle = top + BAR_PIXELS / 2.0
         pen.text((width - 10, middle), figures, ink, self._font, anchor="rm")
         room = width - 30 - pen.textlength(figures, self._font)

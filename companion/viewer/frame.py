@@ -59,9 +59,12 @@ BY_MODE = (WaitReason.PERSON_SETS_MODE, WaitReason.PERSON_SETS_MODE_AND_ARMS)
 MAKES_WAY, SEPARATOR = str(Hindrance.MAKES_WAY.value), "; "
 PLAIN_ENDS = (EndReason.DONE, EndReason.STOPPED_BY_USER)
 """The others are told as what ended the run."""
+PAUSED = "paused: after that it waits for Go on"
 NOT_REACHED = {TargetStatus.PENDING: "not reached"}
 NEWEST_S = 0.5
 """A scan or a planned motion that is older is not shown."""
+HEARD_S = 3.5
+"""The autopilot's heartbeat comes once a second: without one for so long it is silent."""
 KNOWN_S = 2.0
 """A figure that goes by an older position is not known."""
 STATES = {
@@ -90,8 +93,7 @@ Json = dict[str, Any]
 
 def scene_of(mission: Mission, run: MissionRun, epoch: int) -> Json:
     """What stays as it is for a while. ``epoch``: another number for another map."""
-    executor, vehicle = run.executor, run.vehicle
-    layout = None if executor is None else executor.layout
+    executor, vehicle, layout = run.executor, run.vehicle, run.layout
     origin = None if layout is None else layout.origin
     home = None if layout is None else LocalFrame(layout.origin).to_ned(layout.home)
     return {
@@ -227,6 +229,8 @@ def doing_of(companion: Companion, status: Status, headway: Headway | None = Non
     elif activity.phase is RunPhase.WAITING:
         line, _, why = line.partition(" (")
         why = why.removesuffix(")")
+        if companion.mission_run.start_paused and activity.awaited != Reason(WaitReason.REQUEST_TO_BEGIN):
+            why = SEPARATOR.join(filter(None, (why, PAUSED)))
     state = STATES[activity.phase]
     if state == "stopped" and (other := _driven_by(companion)):
         line, state = other, "waiting"
@@ -368,14 +372,15 @@ def _figures(companion: Companion, status: Status) -> Json:
     run, executor, pose = companion.mission_run, companion.executor, status.pose
     ticks = companion.outcome.tick_seconds
     searches_s = [] if executor is None else executor.driver.searcher.seconds
-    clear_m = None
+    heartbeat, clear_m = run.vehicle.heartbeat, None
+    heard = heartbeat is not None and status.time_s - heartbeat.time_s <= HEARD_S
     if executor is not None and pose is not None and is_known(run.vehicle, status.time_s):
         room_m = clearance_m(executor.evidence, pose.point, CLEARANCE_M) - run.mission.rover.footprint.inscribed_m
         clear_m = round(max(room_m, 0.0), 2)
     return {
         "clearance_m": clear_m,
-        "planning_ms": round(1e3 * searches_s[-1], 1) if searches_s else None,
-        "latency_ms": round(1e3 * run.vehicle.latency_s, 1) or None,  # 0: not measured yet
+        "planning_ms": round(1e3 * searches_s[-1], 1) if searches_s and heard else None,
+        "latency_ms": round(1e3 * run.vehicle.latency_s, 1) or None if heard else None,  # 0: not measured yet
         "tick_ms": round(1e3 * ticks[-1], 2) if ticks else None,
     }
 

@@ -59,13 +59,12 @@ def run_of(record: Record, tally: RunTally, result: ReplayResult) -> Run:
 
 
 def named(runs: Sequence[Run]) -> list[Run]:
-    """Runs by the last part of their names, where that is enough to tell them apart."""
+    """Runs by the last part of their names, where that is enough to tell them apart. The same one again is numbered."""
     short = [Path(run.name).resolve().name for run in runs]
-    return (
-        [replace(run, name=name) for run, name in zip(runs, short, strict=True)]
-        if len(set(short)) == len(short)
-        else [*runs]
-    )
+    names = short if len(set(short)) == len(short) else [run.name for run in runs]
+    turns = [names[: i + 1].count(name) for i, name in enumerate(names)]
+    told = [name if turn == 1 else f"{name} ({turn})" for name, turn in zip(names, turns, strict=True)]
+    return [replace(run, name=name) for run, name in zip(runs, told, strict=True)]
 
 
 def joined(record: Record, watched: ReportWatch, run: Run, others: list[Run]) -> Json:
@@ -178,8 +177,8 @@ class ReportWatch(ReplayObserver):
 
     def _keep(self, companion: Companion, status: Status, time_s: float) -> None:
         """A frame of this moment, without what has not changed since the last one."""
-        executor = companion.executor
-        self._steady.note(None if executor is None else executor.layout.origin)
+        layout = companion.mission_run.layout
+        self._steady.note(None if layout is None else layout.origin)
         if self._start is None and status.pose is not None:
             self._start = status.pose.north_m, status.pose.east_m
         frame = self._steady.frame(frame_of(companion, status, self._headway))

@@ -116,7 +116,9 @@ def _token(file: Path) -> str:
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "not a text of plain letters"
         raise WebError(f"--web-token {file}: {why}") from error
-    if len(token) < LEAST_TOKEN or not token.isprintable() or " " in token:
+    if len(token) >= LEAST_TOKEN and " " in token:
+        raise WebError(f"--web-token {file}: has blanks between words; join them, or delete the file for a new token")
+    if len(token) < LEAST_TOKEN or not token.isprintable():
         raise WebError(
             f"--web-token {file}: a token is one word of {LEAST_TOKEN} letters or more; delete the file for a new one"
         )

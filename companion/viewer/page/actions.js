@@ -116,7 +116,8 @@ export class Actions {
   take(answer) {
     clearTimeout(this.silence);
     const name = NAMES[answer.action] ?? answer.action;
-    this.say(answer.ok ? "good" : "error", `${name}: ${answer.text || (answer.ok ? "done" : "refused")}`);
+    // What was refused stays until the next word: who asked for it may look elsewhere.
+    this.say(answer.ok ? "good" : "error", `${name}: ${answer.text || (answer.ok ? "done" : "refused")}`, answer.ok);
   }
 
   say(level, text, ends = true) {
@@ -142,7 +143,7 @@ export class Actions {
     this.toast.hidden = true;
     this.goto.setAttribute("aria-pressed", "true");
     this.stage.classList.add("aiming");
-    this.ask("Now click a place on the map.");
+    this.ask("Now choose a place on the map.");
   }
 
   /** A tap on the map. Returns whether it was meant for this. */

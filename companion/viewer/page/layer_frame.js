@@ -37,7 +37,7 @@ export function drawNothingYet(pen, { frame, map, scene }) {
   const { camera, colours } = pen;
   const free = camera.width - camera.coveredRight;
   const [x, y] = [free / 2, (camera.height - camera.covered) / 2];
-  const lines = ["No position of the rover yet"];
+  const lines = ["The rover's place is not known yet"];
   if (frame?.state !== "ended") lines.push("The map begins with it");
   const widthIn = (look) => Math.max(...lines.map((line) => pen.widthOf(line, look)));
   const usual = { size: 17, weight: 750 };

@@ -12,6 +12,10 @@ const DASHES = [
   [2, 6],
 ];
 
+/** A place farther from the last one than this, and than any rover drives meanwhile, is another idea of where it is. */
+const JUMP_M = 5;
+const FASTEST_M_S = 5;
+
 /** Where the rover touched something, as stars. */
 export function drawContacts(pen, places) {
   const { context, camera, colours } = pen;
@@ -28,18 +32,29 @@ export function drawContacts(pen, places) {
   }
 }
 
-/** Where the rover stopped on its way, as the squares of the timeline. */
-export function drawStops(pen, places) {
+/** Where the rover stopped, or was held up on its way, as the squares of the timeline. */
+export function drawStops(pen, events) {
   const { context, camera, colours } = pen;
-  for (const place of places) {
+  for (const { place, name } of events) {
     const [x, y] = camera.toScreen(...place);
     context.beginPath();
     context.rect(x - 6, y - 6, 12, 12);
     pen.stroke(colours.halo, 4);
     context.fillStyle = colours.ink;
     context.fill();
-    pen.label("stop", x, y, 12, { size: 12, colour: colours.ink });
+    pen.label(name, x, y, 12, { size: 12, colour: colours.ink });
   }
+}
+
+/** The places of a track [t, north, east] as lines: where the position jumps, another one begins. */
+export function unbroken(track) {
+  const lines = [];
+  track.forEach(([t, north, east], i) => {
+    const [before, n, e] = track[i - 1] ?? [t, NaN, NaN];
+    if (!(Math.hypot(north - n, east - e) <= JUMP_M + FASTEST_M_S * (t - before))) lines.push([]);
+    lines.at(-1).push([north, east]);
+  });
+  return lines;
 }
 
 /** Other records: dashed lines, each with its colour and its dashes, and a ring where that rover was at this time. */
@@ -51,6 +66,7 @@ export class Others {
       shown: !other.elsewhere, // another mission has its own zero: its track says nothing on this map
       times: other.track.map(([t]) => t - other.track[0][0]),
       line: other.track.map((p) => p.slice(1)),
+      lines: unbroken(other.track),
     }));
     this.begin = begin;
     const row = (other, i) => {
@@ -81,7 +97,9 @@ export class Others {
   drawTracks(pen) {
     this.others.forEach((other, i) => {
       const colour = pen.colours.others[i % pen.colours.others.length];
-      if (other.shown) pen.line(other.line, { colour, width: 2.5, dash: DASHES[i % DASHES.length], casing: 2 });
+      if (!other.shown) return;
+      const look = { colour, width: 2.5, dash: DASHES[i % DASHES.length], casing: 2 };
+      for (const line of other.lines) pen.line(line, look);
     });
   }
 

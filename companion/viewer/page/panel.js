@@ -2,7 +2,7 @@
 
 import { make, setAttribute, setText } from "viewer/dom.js";
 import { facts, OF_PLACE, readouts, trueFacts } from "viewer/facts.js";
-import { distance } from "viewer/geometry.js";
+import { distance, wayLeft } from "viewer/geometry.js";
 import { setIcon } from "viewer/icons.js";
 import { kindOf } from "viewer/layer_marks.js";
 import { NewsList } from "viewer/news.js";
@@ -79,7 +79,7 @@ export class Panel {
       const ahead = frame?.state === "driving" ? "going there" : "next";
       const missed = ended && status === "pending" ? "not reached" : status;
       setText(row.status, now ? ahead : scene.truth ? "" : missed); // a simulator does not know what became of them
-      setText(row.far, frame?.pose && status === "pending" ? metres(distance(frame.pose, target.place)) : "");
+      setText(row.far, frame?.pose && status === "pending" ? metres(farTo(frame, target, now)) : "");
     });
     const known = `Targets, ${reached} of ${scene?.targets?.length} reached`;
     const first = frame?.goal?.asked === true && !ended;
@@ -111,6 +111,12 @@ export class Panel {
       ...(left > 0 ? [make("li", { class: "nothing" }, `${left} more are not listed; the map shows them.`)] : []),
     );
   }
+}
+
+// Along the path, where the rover follows one there; else straight.
+function farTo(frame, target, now) {
+  const along = now ? wayLeft(frame) : NaN;
+  return Number.isFinite(along) ? along : distance(frame.pose, target.place);
 }
 
 // Before the rover knows where it is, nobody knows where the targets are.

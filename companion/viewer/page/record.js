@@ -140,7 +140,13 @@ function eventsOf(record) {
     const stops = frame.state === "stopped" && before.state !== "stopped";
     const heldUp = Boolean(frame.held_up) && frame.held_up !== before.held_up;
     if (stops || heldUp || (frame.state === "waiting" && before.state === "driving"))
-      events.push({ t: frame.t, kind: "stop", text: frame.line, place: (frame.pose ?? before.pose)?.slice(0, 2) });
+      events.push({
+        t: frame.t,
+        kind: "stop",
+        name: heldUp ? "held up" : "stop",
+        text: frame.line,
+        place: (frame.pose ?? before.pose)?.slice(0, 2),
+      });
   });
   for (const contact of record.contacts)
     events.push({ t: contact.t, kind: "contact", text: `Contact: ${contact.what}` });

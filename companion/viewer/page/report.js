@@ -87,9 +87,12 @@ class ReportPage {
       if (this.choosing) this.decisions.drawCosts(pen);
       else this.others.drawPlaces(pen, this.playback.t);
       const { contacts, events } = this.record;
-      const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t).map((one) => one.place);
+      const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t);
       drawStops(pen, past(events.filter((event) => event.kind === "stop")));
-      drawContacts(pen, past(contacts));
+      drawContacts(
+        pen,
+        past(contacts).map((one) => one.place),
+      );
     });
     this.decisions.changed = () => this.view.invalidate();
   }

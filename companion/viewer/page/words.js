@@ -73,7 +73,8 @@ export function short(name, most = 28) {
 
 /** The first letter large: lines come in small letters. */
 export function sentence(text) {
-  return text ? text[0].toUpperCase() + text.slice(1) : "";
+  // Word joiners: an option such as --arm is not to be broken.
+  return text ? text[0].toUpperCase() + text.slice(1).replaceAll("--", "-\u2060-\u2060") : "";
 }
 
 function two(value) {

@@ -121,6 +121,13 @@ def test_a_rover_that_was_disarmed_or_is_not_heard_does_not_go_on(tmp_path: Path
     assert asked.go_on() == (DENIED, [])
 
 
+def test_a_pause_that_nobody_hears_is_sent_and_said_to_be_unheard(tmp_path: Path) -> None:
+    asked = Asked(tmp_path)
+    asked.later(FRESH_S + 0.1)
+    assert asked.pause() == (DENIED, [RoverMode.HOLD])
+    assert "not heard: take the rover over" in asked.notices.texts[-1]
+
+
 def test_a_hold_or_another_mode_that_was_not_asked_for_here_is_not_left(tmp_path: Path) -> None:
     asked = Asked(tmp_path)
     for mode in (RoverMode.HOLD, RoverMode.MANUAL):

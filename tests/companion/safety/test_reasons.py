@@ -132,6 +132,11 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
         "it was not paused by a request: set GUIDED with ground station or transmitter",
     ),
     (Refusal.NOT_HEARD, (), "the autopilot is not heard"),
+    (
+        Refusal.HOLD_NOT_HEARD,
+        (),
+        "HOLD was sent, but the autopilot is not heard: take the rover over if it moves",
+    ),
     (Refusal.DISARMED, (), "the rover is disarmed"),
     (Refusal.LEGS_OF_AUTO, (), "AUTO says which target is next"),
     (Refusal.NOT_NEXT, (), "only the target after this one may be next"),

@@ -36,6 +36,7 @@ from companion.viewer.frame import (
     MAKES_WAY,
     MOST_PATH,
     MOST_RAYS,
+    PAUSED,
     SOMEBODY,
     _border,
     _outline,
@@ -120,6 +121,12 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         (DRIVING, {"rerouted": "a better path"}, "driving to gate", "a better path"),
         (DRIVING, {"broken_off": LOW, "held_up": "stuck"}, "stuck", "battery low for the autopilot"),
         (WAITING, {}, "waiting for arming", "asked for; the autopilot says if it refuses"),
+        (
+            WAITING,
+            {"start_paused": True},
+            "waiting for arming",
+            f"asked for; the autopilot says if it refuses; {PAUSED}",
+        ),
         (HELD, {}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
         (BLINDED, {}, "stopped: range data silent for over 1 s", "waiting for good data and a person to set X"),
         (
@@ -163,7 +170,7 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
     )  # fmt: skip
     run = SimpleNamespace(
         stop=SimpleNamespace(reason=activity.reason), latch=SimpleNamespace(control=Control.PERSON),
-        taken_over=given.get("taken_over", False),
+        taken_over=given.get("taken_over", False), start_paused=given.get("start_paused", False),
     )  # fmt: skip
     statuses = [("gate", TargetStatus.REACHED), *((name, given[name]) for name in ("shed",) if name in given)]
     companion = SimpleNamespace(

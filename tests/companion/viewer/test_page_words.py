@@ -135,7 +135,7 @@ tell([heads, drawn({ frame }), drawn({ frame: { pose: [0, 0, 0] } }), drawn({ fr
     heads, before, placed, mapped = ran(tmp_path, DOCUMENT + script)
     assert heads[:2] == ["Connecting", "Waiting for the run to begin"]
     assert heads[2] == "Waiting for the autopilot's heartbeat on udpin:0.0.0.0:14550"
-    assert before == ["No position of the rover yet", "The map begins with it"] and placed == mapped == []
+    assert before == ["The rover's place is not known yet", "The map begins with it"] and placed == mapped == []
 
 
 def test_only_what_is_fresh_is_called_live(tmp_path: Path) -> None:
@@ -410,3 +410,12 @@ tell([all.map(silence), all.map((frame) => Boolean(isLost(frame)))]);
     silent, lost = ran(tmp_path, DOCUMENT + script)
     assert silent == ["", "", "", "Autopilot silent for 5 s", "", ""]
     assert lost == [False, False, False, True, True, False]
+
+
+def test_the_track_of_another_record_is_broken_where_its_position_jumps(tmp_path: Path) -> None:
+    script = """
+const { unbroken } = await import("./overlays.js");
+tell([unbroken([[0, 0, 0], [0.4, 1, 0], [60, 2, 0], [60.4, 30, 0], [61, 31, 0]]), unbroken([])]);
+"""
+    lines, none = ran(tmp_path, DOCUMENT + script)
+    assert lines == [[[0, 0], [1, 0], [2, 0]], [[30, 0], [31, 0]]] and none == []

@@ -34,6 +34,7 @@ def film(count: int) -> Film:
     frames = [{**first, "t": 0.0, "pose": [0.0, 0.0, 1.57]}]
     frames += [{"t": 0.4 * number, "pose": [0.0, 30.0 * number / count, 1.57]} for number in range(1, count)]
     frames[count // 10].update(state="driving", line="driving to " + "far " * 50)
+    frames[count // 2].update(speed=None)  # the autopilot is silent from then on
     return Film({"scene": SCENE, "frames": frames, "tiles": [], "contacts": []})
 
 

@@ -178,10 +178,11 @@ def test_garbage_is_answered_or_passed_over(with_token: WebProcess, garbage: str
         next_of(client, "scene")
         client.send(garbage)
         assert next_of(client, "answer")["ok"] is False
-    with connect(f"ws://127.0.0.1:{with_token.place.port}/ws", open_timeout=WAIT_S) as rude:
-        rude.send("x" * 100_000)
-        with pytest.raises(ConnectionClosed):
-            rude.recv(WAIT_S)
+    for words in ("x" * 100_000, b"bytes"):
+        with connect(f"ws://127.0.0.1:{with_token.place.port}/ws", open_timeout=WAIT_S) as rude:
+            rude.send(words)
+            with pytest.raises(ConnectionClosed):
+                rude.recv(WAIT_S)
     assert with_token.asked() == [] and got(with_token, "/")[0] == 200
 
 
@@ -310,6 +311,9 @@ def test_places_and_tokens(tmp_path: Path) -> None:
             web_place(text, given)
     file.write_text("short")
     with pytest.raises(WebError, match="8 letters or more"):
+        web_place("8000", file)
+    file.write_text("some long words")
+    with pytest.raises(WebError, match="has blanks between words"):
         web_place("8000", file)
 
 
