@@ -68,6 +68,7 @@ class LatchReason(Enum):
 
     OTHER_MODE = "mode is not {}"
     PAUSED = "paused on request"
+    RESTARTED = "autopilot restarted, rover disarmed"
     BETWEEN_LEGS = "AUTO goes on by itself"
     DISARMED = "disarmed"
     HOLD_SENT = "HOLD was asked for"

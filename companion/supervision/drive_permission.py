@@ -43,6 +43,8 @@ class DrivePermission:
         run.latch, verdict = check(run.latch, run.vehicle, now_s, settings, doubt)
         if run.paused and verdict.reaction is Reaction.SILENT:
             verdict = replace(verdict, reason=Reason(LatchReason.PAUSED))
+        elif verdict.reaction is Reaction.SILENT and _has_restarted(run.vehicle):
+            verdict = replace(verdict, reason=Reason(LatchReason.RESTARTED))
         drives = verdict.reaction is Reaction.DRIVE
         changed = drives == run.stopped
         if changed or (drives and before is not Control.COMPANION):
@@ -85,6 +87,11 @@ def _for_person(stop: Stop | None) -> str:
     person = awaited.figures[1] if awaited is not None and awaited.kind is WaitReason.GOOD_DATA_AND else awaited
     to_do = isinstance(person, Reason) and person.kind in FOR_A_PERSON
     return f"; it waits for {person}" if to_do else ""
+
+
+def _has_restarted(vehicle: VehicleState) -> bool:
+    """Whether the autopilot has restarted and disarmed the rover: that has led to everything else."""
+    return vehicle.restarted and vehicle.heartbeat is not None and not vehicle.heartbeat.armed
 
 
 def _is_taken(verdict: Verdict, before: Control) -> bool:

@@ -53,7 +53,6 @@ ROLLS_M_S = 0.15
 MOST_MISSED = 3
 """So many targets that were not reached are named."""
 REACHED = TargetStatus.REACHED
-RESTARTED = "autopilot restarted, rover disarmed"
 SOMEBODY = "a person, or by the autopilot itself"
 BY_MODE = (WaitReason.PERSON_SETS_MODE, WaitReason.PERSON_SETS_MODE_AND_ARMS)
 MAKES_WAY, SEPARATOR = str(Hindrance.MAKES_WAY.value), "; "
@@ -261,12 +260,11 @@ def _driving(companion: Companion, status: Status, headway: Headway | None) -> t
 
 def _stopped(companion: Companion, activity: Activity) -> tuple[str, str]:
     """Why it stands, and what for. Data that is missing comes before the mode: mostly the one has led to the other.
-
-    An autopilot that has restarted has disarmed the rover, and has led to everything else.
+    An autopilot that has restarted has led to everything else.
     """
     vehicle = companion.vehicle
-    if vehicle.restarted and vehicle.heartbeat is not None and not vehicle.heartbeat.armed:
-        return f"stopped: {RESTARTED}", f"waiting for {activity.awaited}"
+    if activity.reason is not None and activity.reason.kind is LatchReason.RESTARTED:
+        return f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
     if activity.awaited is not None and activity.awaited.kind is WaitReason.GOOD_DATA_AND:
         data, person = activity.awaited.figures
         return f"stopped: {data}", f"waiting for good data and {person}"

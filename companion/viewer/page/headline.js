@@ -28,7 +28,7 @@ export class Headline {
       { class: "headline" },
       this.sign,
       make("div", { class: "words" }, this.line, this.why, this.spoken),
-      make("div", { class: "about" }, this.mission, make("span", { class: "when" }, this.badge, this.clock)),
+      (this.about = make("div", { class: "about" }, this.mission, make("span", { class: "when" }, this.badge, this.clock))),
     );
     this.show(null, null);
   }
@@ -43,6 +43,7 @@ export class Headline {
     setAttribute(this.line, "data-long", line.length > LONG ? "" : null);
     setText(this.spoken, trouble ? trouble.replace(/ for \d.*/, "") : (frame?.line ?? ""));
     setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
+    this.about.hidden = !scene && !frame; // nothing in it
     setText(this.mission, scene?.mission ?? "");
     setText(this.badge, scene ? badge(scene, state === "ended", trouble, open) : "");
     setText(this.clock, frame ? namedClock(frame.t, scene) : "");

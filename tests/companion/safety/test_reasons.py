@@ -68,6 +68,7 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (LatchReason.DISARMED, (), "disarmed"),
     (LatchReason.HOLD_SENT, (), "HOLD was asked for"),
     (LatchReason.PAUSED, (), "paused on request"),
+    (LatchReason.RESTARTED, (), "autopilot restarted, rover disarmed"),
     (LatchReason.HOLD_LOST, (), "the first HOLD was not taken"),
     (WaitReason.HEARTBEAT, (" on udpin:0.0.0.0:14550",), "the autopilot's heartbeat on udpin:0.0.0.0:14550"),
     (WaitReason.ORIGIN_AND_HOME, (), "the autopilot's origin and home (they come once its GPS and EKF are ready)"),

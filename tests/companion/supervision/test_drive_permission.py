@@ -8,7 +8,7 @@ from pathlib import Path
 from companion.safety.mode_latch import Control, Reaction
 from companion.safety.reasons import Doubt, Reason, RunPhase, WaitReason
 from companion.supervision.drive_permission import DrivePermission
-from companion.vehicle.events import Event, HeartbeatSeen
+from companion.vehicle.events import Event, HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState, fold
 from tests.companion.safety.test_mode_latch import GUIDED, HOLD
 from tests.support.desk import Desk
@@ -95,6 +95,16 @@ def test_a_pause_that_was_asked_for_was_told_then_and_is_not_told_again(tmp_path
     assert activity.needs_person and str(activity) == (
         "stopped: paused on request, waiting for a person to ask it to go on, or to set GUIDED"
     )
+
+
+def test_an_autopilot_that_has_restarted_is_why_it_stands(tmp_path: Path) -> None:
+    permitted = Permitted(tmp_path)
+    permitted.verdict()
+    permitted.stand(0.0, 0.0, mode=RoverMode.MANUAL, armed=False)
+    permitted.run.vehicle = replace(permitted.run.vehicle, restarted=True)
+    assert permitted.verdict() is Reaction.SILENT and not permitted.run.taken_over
+    assert permitted.notices.texts[0].startswith("Companion no longer steers: autopilot restarted, rover disarmed")
+    assert str(permitted.run.activity).startswith("stopped: autopilot restarted, rover disarmed, waiting for a person")
 
 
 def test_who_drives_is_followed_from_heartbeat_to_heartbeat_before_the_mission(tmp_path: Path) -> None:

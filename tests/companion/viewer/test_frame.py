@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -105,7 +106,7 @@ DONE, BY_USER, NOBODY = (
 LOW = Reason(PowerReason.LOW, ("battery",))
 STILL_ARMED = Reason(Parting.ARMED, ("HOLD",))
 ROLLS, PILOT = {"forward_m_s": 1.0}, {"mode": RoverMode.MANUAL}
-RESTARTED = {"restarted": True, "armed": False}
+RESTARTED = replace(BLINDED, reason=Reason(LatchReason.RESTARTED))
 TAKEN = {"taken_over": True}
 SHED = {"shed": TargetStatus.UNREACHABLE}
 
@@ -129,13 +130,7 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         ),
         (HELD, {}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
         (BLINDED, {}, "stopped: range data silent for over 1 s", "waiting for good data and a person to set X"),
-        (
-            HELD,
-            RESTARTED,
-            "stopped: autopilot restarted, rover disarmed",
-            "waiting for a person to set X",
-        ),
-        (HELD, {**RESTARTED, "armed": True}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
+        (RESTARTED, {}, "stopped: autopilot restarted, rover disarmed", f"waiting for {BLIND}"),
         (HELD, TAKEN, f"stopped: HOLD was set by {SOMEBODY}", "waiting for a person to set X"),
         (HELD, {**PILOT, **TAKEN}, "the pilot drives (MANUAL)", "waiting for a person to set X"),
         (HELD, PILOT, "the pilot drives (MANUAL)", "waiting for a person to set X"),
@@ -166,7 +161,6 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
     heartbeat = SimpleNamespace(mode=given.get("mode", RoverMode.HOLD), armed=given.get("armed", True))
     vehicle = SimpleNamespace(
         heartbeat=heartbeat, is_ours=False, forward_m_s=given.get("forward_m_s", 0.0),
-        restarted=given.get("restarted", False),
     )  # fmt: skip
     run = SimpleNamespace(
         stop=SimpleNamespace(reason=activity.reason), latch=SimpleNamespace(control=Control.PERSON),
