@@ -37,12 +37,13 @@ def save_plan(
     lines = (start, target, cells, tight, *([] if path is None or path.curve is None else [path.curve]))
     figure = MapFigure(framed(*(grid.places_of(line) for line in lines)))
     _show(figure, _shaded(grid), extent_of(grid))
-    for colour, label in ((START_COLOUR, "start"), (TARGET_COLOUR, "target"), (OBSTACLE_COLOUR, "obstacle")):
+    ground = ((OBSTACLE_COLOUR, "obstacle"), (FREE_COLOUR, "free (darker is costlier)"))
+    for colour, label in ((START_COLOUR, "start"), (TARGET_COLOUR, "target"), *ground):
         figure.key(_rgb(colour), label)
-    if path is not None:
+    if len(cells) > 1:
         _line(figure, grid.places_of(cells), PATH_COLOUR, 4.0)
         figure.key(_rgb(PATH_COLOUR), "path, field by field")
-        if path.curve is not None:
+        if path is not None and path.curve is not None:
             _line(figure, grid.places_of(path.curve), CURVE_COLOUR, 2.0)
             figure.key(_rgb(CURVE_COLOUR), "its smooth curve")
     for end, colour in ((start, START_COLOUR), (target, TARGET_COLOUR)):
