@@ -32,7 +32,8 @@ MOST_STEPS = 1200
 """A rover that does not stand by then never does."""
 STANDS_M_S, STANDS_RAD_S = 0.02, 0.02
 NEARER_M, NEARER_UNSEEN_M = 0.05, 0.1
-"""So deep the outline may lie over the middle of a cell: steps in time and cells make ways differ by as much."""
+"""So deep the outline may lie over the middle of a cell, and the rover's middle in a closed field: steps in time and
+cells make ways differ by as much."""
 AWAY_M, AWAY = 0.02, 0.1
 """A rover whose outline lies deeper over something may get so much deeper, so that it gets away; but with each metre it
 must get out of it by the second."""
@@ -235,19 +236,37 @@ def _was_seen(y, x, evidence):
 
 
 @njit(cache=True, nogil=True)
-def _is_closed(place, evidence):
-    """Whether the rover's middle is in a field that mission, fence or experience closes."""
+def _is_closed(north, east, evidence, by_experience):
+    """Whether a place is in a field that mission or fence closes, or experience, if that is asked for."""
     rows, columns = evidence.base.shape
     field_m = evidence.cell_m * (evidence.log_odds.shape[0] // rows)
-    y, x = int(math.floor(place[0] / field_m)), int(math.floor(place[1] / field_m))
-    return 0 <= y < rows and 0 <= x < columns and evidence.base[y, x] + evidence.penalty[y, x] >= 1.0
+    y, x = int(math.floor(north / field_m)), int(math.floor(east / field_m))
+    if not (0 <= y < rows and 0 <= x < columns):
+        return False
+    return evidence.base[y, x] >= 1.0 or (by_experience and evidence.base[y, x] + evidence.penalty[y, x] >= 1.0)
+
+
+@njit(cache=True, nogil=True)
+def _is_deep_in_closed(place, evidence, by_experience):
+    """Whether the rover's middle lies so deep in closed fields: it may cut a corner of one."""
+    north, east = place[0], place[1]
+    return (
+        _is_closed(north - NEARER_M, east, evidence, by_experience)
+        and _is_closed(north + NEARER_M, east, evidence, by_experience)
+        and _is_closed(north, east - NEARER_M, evidence, by_experience)
+        and _is_closed(north, east + NEARER_M, evidence, by_experience)
+    )
 
 
 @njit(cache=True, nogil=True)
 def meets(places, outline, under, under_m, evidence):
-    """The number of a ``Met``. Ground counts as seen within ``under_m`` of the place ``under``."""
+    """The number of a ``Met``. Ground counts as seen within ``under_m`` of the place ``under``.
+
+    Fields that experience has closed do not keep the rover there: they count only farther away than it reaches.
+    """
     begins_m, _ = _deepest(places[0], outline, under, under_m, evidence)
-    was_closed = _is_closed(places[0], evidence)
+    reach_m = math.hypot(max(outline.front_m, outline.rear_m), outline.half_width_m)
+    was_closed = _is_deep_in_closed(places[0], evidence, True)
     for at in range(1, places.shape[0]):
         obstacle_m, unseen_m = _deepest(places[at], outline, under, under_m, evidence)
         gone_m = math.hypot(places[at, 0] - places[0, 0], places[at, 1] - places[0, 1])
@@ -255,7 +274,7 @@ def meets(places, outline, under, under_m, evidence):
             return 1
         if unseen_m > NEARER_UNSEEN_M:
             return 2
-        closed = _is_closed(places[at], evidence)
+        closed = _is_deep_in_closed(places[at], evidence, gone_m > reach_m)
         if closed and not was_closed:
             return 3
         was_closed = closed

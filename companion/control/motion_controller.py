@@ -52,6 +52,8 @@ BRAKE_TURNS = (0.0, -0.5, 0.5, -1.0, 1.0)
 """Turn rates to brake with, as shares of the fastest."""
 ENOUGH_M = 0.1
 """With so much room it does not turn while it brakes."""
+STRAIGHTER_M = 0.03
+"""Nor where turning keeps hardly more room than that: no model of a rover is that exact."""
 STANDS_M_S = 0.05
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
 """Turn rates for which the fastest speed is looked for that may be told, as shares of the fastest."""
@@ -205,7 +207,7 @@ class MotionController:
         """The way to brake that keeps most room, straight on where there is enough."""
         now_s, fastest_rad_s = self._time_s, worst.model.turn_fastest_rad_s
         spare_m = {share: _least_spare_m(share * fastest_rad_s, view, worst) for share in BRAKE_TURNS}
-        best = max(BRAKE_TURNS, key=lambda share: min(spare_m[share], ENOUGH_M))
+        best = max(BRAKE_TURNS, key=lambda share: min(spare_m[share], ENOUGH_M) - STRAIGHTER_M * (share != 0.0))
         rolls = abs(worst.start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
 

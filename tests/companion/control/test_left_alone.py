@@ -172,6 +172,26 @@ def test_a_field_that_is_closed_may_be_left_and_not_entered() -> None:
     assert fault(GuidedVelocity(0.5, 0.0), inside) is None
 
 
+@pytest.mark.parametrize(("beside_m", "refused"), [(0.03, False), (0.1, True)])
+def test_the_corner_of_a_closed_field_may_be_cut(beside_m: float, refused: bool) -> None:
+    """The rover's middle passes so deep inside its edge, for a metre."""
+    evidence = open_ground()
+    evidence.base.weights[int(MIDDLE) + 1, int(MIDDLE)] = 1.0
+    at = replace(view(evidence, 1.0), pose=Pose(MIDDLE + 0.5, MIDDLE + 1.0 - beside_m, 0.0, 0.0))
+    assert fault(GuidedVelocity(1.0, 0.0), at) is (SetpointFault.INTO_OBSTACLE if refused else None)
+
+
+@pytest.mark.parametrize(("row", "told_m_s", "refused"), [(1, 0.3, False), (2, 2.0, True)])
+def test_what_experience_closed_does_not_keep_a_rover_that_reaches_into_it(
+    row: int, told_m_s: float, refused: bool
+) -> None:
+    """It reaches 0.84 m. The first row begins 0.1 m ahead, the second one beyond its reach."""
+    evidence = open_ground()
+    evidence.penalty[int(MIDDLE) + row, :] = 1.0
+    at = replace(view(evidence, 0.8), pose=Pose(MIDDLE + 0.9, MIDDLE + 0.5, 0.0, 0.0))
+    assert fault(GuidedVelocity(told_m_s, 0.0), at) is (SetpointFault.INTO_OBSTACLE if refused else None)
+
+
 @pytest.mark.parametrize(("lasts_s", "refused"), [(0.35, False), (3.2, True)])
 def test_borders_count_for_as_long_as_the_velocity_lasts(lasts_s: float, refused: bool) -> None:
     """1 m/s, 4 m before a border: without a guard the rover goes on for 3.2 s."""

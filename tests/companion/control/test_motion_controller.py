@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from companion.control import motion_controller
 from companion.control.controller import Purpose
 from companion.control.following import AS_SHIPPED, Following, turn_gains, within_limits
 from companion.control.local_view import LocalView
@@ -309,6 +310,21 @@ def test_it_foresees_no_better_braking_than_of_a_rover_that_is_told_to_stand() -
     assert places is not None
     rolled_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))))
     assert np.all(rolled_m[:8] >= braked_m(1.9, times_s, at.settings.guidance)[:8] - 0.15)
+
+
+@pytest.mark.parametrize(("turned_m", "turns"), [(-0.127, False), (-0.1, True)])
+def test_it_turns_while_it_brakes_only_for_clearly_more_room(
+    monkeypatch: pytest.MonkeyPatch, turned_m: float, turns: bool
+) -> None:
+    evidence = ground()
+    wall(evidence, 4.0, 8.0, 12.0)
+    monkeypatch.setattr(
+        motion_controller, "_least_spare_m", lambda turn_rad_s, *_: turned_m if turn_rad_s > 0.0 else -0.143
+    )
+    leads = controller()
+    command = leads.follow(PATH, view(evidence, Pose(3.0, 10.0, 0.0, 0.0), 1.9))
+    assert command.purpose is Purpose.BRAKE and leads.choice is not None
+    assert (leads.choice.told.turn_rad_s > 0.0) is turns
 
 
 def test_it_foresees_that_it_backs_off() -> None:
