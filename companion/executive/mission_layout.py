@@ -26,6 +26,16 @@ from companion.settings import MappingSettings
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class MissionPlaces:
+    """Where the mission lies, without its map. Its metres and fields count from ``home``."""
+
+    origin: GeoPoint
+    home: GeoPoint
+    targets: tuple[ResolvedTarget, ...]
+    bounds: Bounds
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class MissionLayout:
     """Where the mission lies. Its metres and fields count from ``home``, home as it was when the mission began."""
 
@@ -41,6 +51,11 @@ class MissionLayout:
     bounds: Bounds
     refused: Mapping[int, str]
     """What is wrong with targets behind the autopilot's fence, by their number from 0."""
+
+    @property
+    def places(self) -> MissionPlaces:
+        """The same without the map, which may be large."""
+        return MissionPlaces(self.origin, self.home, self.targets, self.bounds)
 
 
 def lay(

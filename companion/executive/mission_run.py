@@ -22,7 +22,7 @@ from companion.core.scan import RangeScan
 from companion.core.severity import Severity, TextSink
 from companion.executive.auto_mode_legs import AutoModeLegs
 from companion.executive.mission_executor import MissionExecutor, MissionTask
-from companion.executive.mission_layout import MissionLayout
+from companion.executive.mission_layout import MissionLayout, MissionPlaces
 from companion.executive.mission_progress import MissionProgress, TargetStatus
 from companion.executive.setpoint_sender import SetpointSender
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -99,7 +99,7 @@ class MissionRun:
         """None until the mission has begun."""
         self.awaited: Reason[WaitReason] | None = None
         """What arming waits for; None before it has looked."""
-        self.laid: MissionLayout | None = None
+        self.laid: MissionPlaces | None = None
         """Where the mission lies, as arming has found before it begins; None before that is known."""
         self.stop: Stop | None = None
         """Why the rover was not to be driven in the last tick; None if it was."""
@@ -135,9 +135,9 @@ class MissionRun:
         return Activity(phase, self.stop.reason, self.stop.awaited)
 
     @property
-    def layout(self) -> MissionLayout | None:
+    def places(self) -> MissionPlaces | None:
         """Where the mission lies; None before that is known."""
-        return self.laid if self.executor is None else self.executor.layout
+        return self.laid if self.executor is None else self.executor.layout.places
 
     @property
     def told(self) -> ControlCommand | None:

@@ -267,7 +267,7 @@ class Arming:
         if self._previous is None and cleared.layout.refused:
             mission, reason = self._run.mission, next(iter(cleared.layout.refused.values()))
             raise MissionError(f"{mission.source or mission.name}: {reason}")
-        self._checked, self._bounds, self._run.laid = ground, cleared.layout.bounds, cleared.layout
+        self._checked, self._bounds, self._run.laid = ground, cleared.layout.bounds, cleared.layout.places
         for line in doubtful_places(self._run.mission, cleared.layout.home):
             self._notifier.tell(f"Warning: {line}", Severity.WARNING)
 

@@ -126,8 +126,8 @@ class ViewerFeed:
             self._watch.tell_again(place for place, _ in news)
 
     def _frame(self, status: Status) -> Json:
-        layout = self._companion.mission_run.layout
-        self.steady.note(None if layout is None else layout.origin)
+        places = self._companion.mission_run.places
+        self.steady.note(None if places is None else places.origin)
         frame = self.steady.frame(frame_of(self._companion, status, self._headway))
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
         frame["contacts"] = None if self.touched is None else len(self.touched)

@@ -92,9 +92,9 @@ Json = dict[str, Any]
 
 def scene_of(mission: Mission, run: MissionRun, epoch: int) -> Json:
     """What stays as it is for a while. ``epoch``: another number for another map."""
-    executor, vehicle, layout = run.executor, run.vehicle, run.layout
-    origin = None if layout is None else layout.origin
-    home = None if layout is None else LocalFrame(layout.origin).to_ned(layout.home)
+    executor, vehicle, places = run.executor, run.vehicle, run.places
+    origin = None if places is None else places.origin
+    home = None if places is None else LocalFrame(places.origin).to_ned(places.home)
     return {
         "kind": "scene",
         "format": FORMAT,
@@ -103,8 +103,8 @@ def scene_of(mission: Mission, run: MissionRun, epoch: int) -> Json:
         "home": None if home is None else _place(home),
         "origin": None if origin is None else [origin.lat_deg, origin.lon_deg],
         "rover": {"outline": _outline(mission.rover.footprint), "cruise_m_s": mission.rover.cruise_speed_m_s},
-        "targets": [] if layout is None else [{"name": one.name, "place": _place(one.point)} for one in layout.targets],
-        "borders": [] if layout is None else [border for one in layout.bounds for border in _border(one)],
+        "targets": [] if places is None else [{"name": one.name, "place": _place(one.point)} for one in places.targets],
+        "borders": [] if places is None else [border for one in places.bounds for border in _border(one)],
         "map": None if executor is None else _map(executor),
         "vehicle": None if vehicle.heartbeat is None else vehicle.heartbeat.system_id,
     }

@@ -177,8 +177,8 @@ class ReportWatch(ReplayObserver):
 
     def _keep(self, companion: Companion, status: Status, time_s: float) -> None:
         """A frame of this moment, without what has not changed since the last one."""
-        layout = companion.mission_run.layout
-        self._steady.note(None if layout is None else layout.origin)
+        places = companion.mission_run.places
+        self._steady.note(None if places is None else places.origin)
         if self._start is None and status.pose is not None:
             self._start = status.pose.north_m, status.pose.east_m
         frame = self._steady.frame(frame_of(companion, status, self._headway))
