@@ -20,10 +20,10 @@ from companion.app import Status
 from companion.recording.reader import load_record
 from companion.recording.recorder import Recorder
 from companion.replay.replay import replay
+from companion.safety.reasons import LatchReason
 from companion.settings import Settings
 from companion.viewer import feed
 from companion.viewer.feed import ViewerFeed
-from companion.viewer.frame import RESTARTED
 from companion.viewer.report_data import ReportWatch
 from companion.viewer.terminal.painter import MakeView, Painter
 from companion.viewer.terminal.run_view import RunView
@@ -209,7 +209,7 @@ def test_the_news_tell_all_that_the_companion_said(driven: Driven) -> None:
 @pytest.mark.parametrize(("columns", "rows"), [(60, 16), (80, 24), (140, 40)])
 def test_what_is_waited_for_and_the_newest_news_can_be_read(driven: Driven, columns: int, rows: int) -> None:
     status, view = driven.statuses[-1], driven.views[-2]
-    told = f"stopped: {RESTARTED}, waiting for {status.activity.awaited}"
+    told = f"stopped: {LatchReason.RESTARTED.value}, waiting for {status.activity.awaited}"
     lines = screen(view, columns, rows)
     assert len(lines) == rows
     below = [line.strip() for line in lines[max(n for n, line in enumerate(lines) if line.startswith("╰")) + 1 :]]
