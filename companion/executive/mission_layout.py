@@ -36,19 +36,15 @@ class MissionPlaces:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class MissionLayout:
-    """Where the mission lies. Its metres and fields count from ``home``, home as it was when the mission began."""
+class MissionLayout(MissionPlaces):
+    """The same with its map. Home is as it was when the mission began."""
 
-    origin: GeoPoint
-    home: GeoPoint
-    targets: tuple[ResolvedTarget, ...]
     start: ResolvedTarget
     """Where the rover was when the mission began: it returns there when it has to."""
     ground: Grid
     """What was known of it beforehand; obstacles have their own size there."""
     evidence: EvidenceMap
     fence: AutopilotFence
-    bounds: Bounds
     refused: Mapping[int, str]
     """What is wrong with targets behind the autopilot's fence, by their number from 0."""
 
@@ -72,7 +68,7 @@ def lay(
     resolved, evidence = _laid(mission, settings, LocalFrame(origin), home, fence, narrow_sight)
     start = _start(pose.point, resolved.ground)
     return MissionLayout(
-        origin, home, resolved.targets, start, resolved.ground, evidence, fence, resolved.bounds, resolved.refused
+        origin, home, resolved.targets, resolved.bounds, start, resolved.ground, evidence, fence, resolved.refused
     )
 
 

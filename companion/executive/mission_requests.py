@@ -83,14 +83,14 @@ class MissionRequests:
                 self._notifier.tell("Paused on request: the mission does not begin", Severity.WARNING)
             self._run.start_paused = True
             return None
-        silent = _is_silent(vehicle, now_s)
-        if not silent and vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.HOLD:
+        heard = _heard(vehicle, now_s)
+        if heard is not None and heard.mode == RoverMode.HOLD:
             return None
         if not vehicle.is_ours:
             return Reason(Refusal.NOT_DRIVING, (self._run.activity,))
         self._asked_s = now_s
         self._run.sender.send(SetMode(RoverMode.HOLD), now_s)
-        if silent:
+        if heard is None:
             return Reason(Refusal.HOLD_NOT_HEARD)
         self._notifier.tell("Paused on request: HOLD", Severity.WARNING)
         return None
@@ -106,9 +106,10 @@ class MissionRequests:
             return None
         if not self._run.paused:
             return Reason(Refusal.NOT_PAUSED, (own.name,))
-        if _is_silent(vehicle, now_s):
+        heard = _heard(vehicle, now_s)
+        if heard is None:
             return Reason(Refusal.NOT_HEARD)
-        if vehicle.heartbeat is not None and not vehicle.heartbeat.armed:
+        if not heard.armed:
             return Reason(Refusal.DISARMED)
         self._left_s = now_s
         self._notifier.tell(f"Going on as requested: {own.name}", Severity.WARNING)
@@ -152,6 +153,7 @@ class MissionRequests:
         self._run.sender.send(AnswerRequest(asker, form, answer, reason), now_s)
 
 
-def _is_silent(vehicle: VehicleState, now_s: float) -> bool:
-    """Whether the autopilot is not heard: nobody knows then what it does."""
-    return vehicle.heartbeat is None or now_s - vehicle.heartbeat.time_s > FRESH_S
+def _heard(vehicle: VehicleState, now_s: float) -> HeartbeatSeen | None:
+    """The newest heartbeat; None if it says nothing of now."""
+    heartbeat = vehicle.heartbeat
+    return None if heartbeat is None or now_s - heartbeat.time_s > FRESH_S else heartbeat

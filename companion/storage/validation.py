@@ -17,6 +17,9 @@ WANTED = {
     "tuple_type": "a list in [brackets]",
 }
 """What pydantic calls by names of Python's types."""
+NUMBER = r"[+-]?[\d_]+([.,]\d+)?"
+QUOTED = {"float_type": NUMBER, "int_type": r"[+-]?\d+", "bool_type": "true|false"}
+"""What people put in quotes where it needs none."""
 
 
 def first_fault(error: ValidationError) -> tuple[str, str]:
@@ -45,10 +48,11 @@ def alike(name: str, known: Iterable[str]) -> str:
     return ""
 
 
-def quoted_hint(value: object) -> str:
-    """What to add to the refusal of a number in quotes; empty for anything else."""
-    quoted = isinstance(value, str) and re.fullmatch(r"[+-]?\d+(\.\d+)?", value.strip())
-    return f"; write {value.strip()} without quotes" if isinstance(value, str) and quoted else ""
+def quoted_hint(value: object, wanted: str = NUMBER) -> str:
+    """What to add to the refusal of what stands in quotes and should not; empty for anything but ``wanted``."""
+    if not isinstance(value, str) or not re.fullmatch(wanted, value.strip()):
+        return ""
+    return f"; write {value.strip().replace(',', '.')} without quotes"
 
 
 def number_hint(text: object) -> str:
@@ -74,22 +78,14 @@ def _described(error: ValidationError, model: type[BaseModel]) -> str:
         wanted, given = fault["ctx"]["max_length"], fault.get("input")
         return f"{place}: {wanted} values are wanted (got {given!r:.60}); decimals have a point, 18.0 and not 18,0"
     if fault["type"] != "extra_forbidden":
-        return (
-            f"{place}: {reason.lower()} (got {fault.get('input')!r:.60}){_unquoted(fault['type'], fault.get('input'))}"
-        )
+        unquoted = QUOTED.get(fault["type"])
+        hint = quoted_hint(fault.get("input"), unquoted) if unquoted else ""
+        return f"{place}: {reason.lower()} (got {fault.get('input')!r:.60}){hint}"
     known = _known_keys(model, fault["loc"][:-1])
     near = alike(str(fault["loc"][-1]), known)
     hint = f", did you mean '{near}'?" if near else f"; known here: {', '.join(known)}"
     sections = [] if len(fault["loc"]) > 1 else _sections_with(model, str(fault["loc"][0]))
     return f"{place}: unknown key{f'; it stands below [{sections[0]}]' if len(sections) == 1 else hint}"
-
-
-def _unquoted(kind: str, value: object) -> str:
-    """What to add where a number or a truth value stands in quotes; empty elsewhere."""
-    wanted = {"float_type": r"[+-]?[\d_]+([.,]\d+)?", "int_type": r"[+-]?\d+", "bool_type": "true|false"}.get(kind)
-    if wanted is None or not isinstance(value, str) or not re.fullmatch(wanted, value.strip()):
-        return ""
-    return f"; write {value.strip().replace(',', '.')} without quotes"
 
 
 def _sections_with(model: type[BaseModel], key: str) -> list[str]:

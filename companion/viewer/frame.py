@@ -62,10 +62,6 @@ PAUSED = "paused: after that it waits for Go on"
 NOT_REACHED = {TargetStatus.PENDING: "not reached"}
 NEWEST_S = 0.5
 """A scan or a planned motion that is older is not shown."""
-HEARD_S = 3.5
-"""The autopilot's heartbeat comes once a second: without one for so long it is silent."""
-KNOWN_S = 2.0
-"""A figure that goes by an older position is not known."""
 STATES = {
     RunPhase.CONNECTING: "connecting",
     RunPhase.WAITING: "waiting",
@@ -118,7 +114,7 @@ def frame_of(companion: Companion, status: Status, headway: Headway | None = Non
         "kind": "frame",
         "t": round(now_s, 2),
         "pose": None if pose is None else [*_place(pose.point), round(pose.heading_rad, 4)],
-        "speed": round(vehicle.forward_m_s, 3) if is_known(vehicle, now_s) else None,
+        "speed": None if vehicle.position is None else round(vehicle.forward_m_s, 3),
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
         **mode_of(vehicle, run),
         **doing_of(companion, status, headway),
@@ -138,11 +134,6 @@ def frame_of(companion: Companion, status: Status, headway: Headway | None = Non
         "paused": run.paused or run.start_paused,
         "news": news_of(status),
     }
-
-
-def is_known(vehicle: VehicleState, now_s: float) -> bool:
-    """Whether the newest position is new enough to say how fast the rover is now, and how near to something."""
-    return vehicle.position is not None and now_s - vehicle.position.time_s <= KNOWN_S
 
 
 def news_of(status: Status, headway: Headway | None = None) -> list[Json]:
@@ -370,15 +361,14 @@ def _figures(companion: Companion, status: Status) -> Json:
     run, executor, pose = companion.mission_run, companion.executor, status.pose
     ticks = companion.outcome.tick_seconds
     searches_s = [] if executor is None else executor.driver.searcher.seconds
-    heartbeat, clear_m = run.vehicle.heartbeat, None
-    heard = heartbeat is not None and status.time_s - heartbeat.time_s <= HEARD_S
-    if executor is not None and pose is not None and is_known(run.vehicle, status.time_s):
+    clear_m = None
+    if executor is not None and pose is not None:
         room_m = clearance_m(executor.evidence, pose.point, CLEARANCE_M) - run.mission.rover.footprint.inscribed_m
         clear_m = round(max(room_m, 0.0), 2)
     return {
         "clearance_m": clear_m,
-        "planning_ms": round(1e3 * searches_s[-1], 1) if searches_s and heard else None,
-        "latency_ms": round(1e3 * run.vehicle.latency_s, 1) or None if heard else None,  # 0: not measured yet
+        "planning_ms": round(1e3 * searches_s[-1], 1) if searches_s else None,
+        "latency_ms": round(1e3 * run.vehicle.latency_s, 1) or None,  # 0: not measured yet
         "tick_ms": round(1e3 * ticks[-1], 2) if ticks else None,
     }
 

@@ -3,7 +3,7 @@
 import uPlot from "viewer/uplot.js";
 import { theme } from "viewer/colours.js";
 import { make, setText } from "viewer/dom.js";
-import { KINDS } from "viewer/figures.js";
+import { KINDS, valueIn } from "viewer/figures.js";
 import { elapsed, lasting, number, UNKNOWN } from "viewer/words.js";
 
 const EVERY_MS = 500;
@@ -144,7 +144,7 @@ function widthOf(texts) {
 
 /** What stands above a chart: the value `pointed` at, else that of now. After the end there is none. */
 export function valueOf(kind, frame, pointed) {
-  const now = frame?.state === "ended" ? null : kind.of(frame ?? {});
+  const now = frame?.state === "ended" ? null : valueIn(frame ?? {}, kind);
   const value = pointed === undefined ? now : pointed;
   return Number.isFinite(value) ? `${number(value, kind.digits)} ${kind.unit}` : UNKNOWN;
 }

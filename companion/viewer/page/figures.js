@@ -1,5 +1,7 @@
 // The few numbers over time that are drawn as charts. Live they reach back ten minutes; a record keeps all of them.
 
+import { isLost, silence } from "viewer/freshness.js";
+
 const KEPT_S = 600;
 const MOST = 6000;
 const DRAWN = 2000;
@@ -17,6 +19,11 @@ function speedOf({ speed }) {
   return Number.isFinite(speed) ? Math.abs(speed) : null;
 }
 
+/** One of them now; null where it is not known, or goes by what is old. */
+export function valueIn(frame, kind) {
+  return silence(frame) || isLost(frame) ? null : (kind.of(frame) ?? null);
+}
+
 export class Figures {
   constructor(keptS = KEPT_S) {
     this.keptS = keptS;
@@ -32,7 +39,7 @@ export class Figures {
   add(frame) {
     if (!Number.isFinite(frame.t)) return;
     this.times.push(frame.t);
-    KINDS.forEach((kind, i) => this.values[i].push(kind.of(frame) ?? null));
+    KINDS.forEach((kind, i) => this.values[i].push(valueIn(frame, kind)));
     this.version += 1;
     // Cut now and then, not each time: moving the whole list is what costs.
     if (this.keptS < Infinity && this.times.length % 100 === 0) this.cut();
