@@ -17,6 +17,7 @@ from companion.app import Companion, Status
 from companion.checkpoint.checkpointer import Checkpointer
 from companion.control.model_estimate import described
 from companion.core.clock import stopwatch_s
+from companion.core.interrupts import WholeSteps
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import warm_up
 from companion.lidar.reader import Chunk, lidars_on
@@ -250,15 +251,16 @@ class Drive:
         """Drive until the mission has ended or the time limit is reached; ``observe`` is called every few ticks."""
         began_s = stopwatch_s()
         next_track_s = next_look_s = 0.0
-        while not self.companion.done and self.simulator.time_s < self.time_limit_s:
-            self.companion.tick()
-            self._news += self.companion.news
-            if self.simulator.time_s >= next_track_s:
-                next_track_s += TRACK_PERIOD_S
-                self._note_track()
-            if self.simulator.time_s >= next_look_s:
-                next_look_s += every_s
-                observe(self.take_status())
+        with WholeSteps() as steps:  # a record of half a tick would be a damaged one
+            while not self.companion.done and self.simulator.time_s < self.time_limit_s:
+                steps.do(self.companion.tick)
+                self._news += self.companion.news
+                if self.simulator.time_s >= next_track_s:
+                    next_track_s += TRACK_PERIOD_S
+                    self._note_track()
+                if self.simulator.time_s >= next_look_s:
+                    next_look_s += every_s
+                    observe(self.take_status())
         self._note_track()
         self.report.wall_time_s = stopwatch_s() - began_s
         self._sum_up()

@@ -1,0 +1,51 @@
+"""A drive that is interrupted in the middle of a tick."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from companion.mission.load import load_mission
+from companion.recording.reader import load_record
+from companion.recording.recorder import Recorder
+from companion.safety.reasons import EndReason
+from companion.settings import Settings
+from sitl.lockstep import Drive
+from sitl.scenario import simulated
+
+MISSION = Path(__file__).resolve().parents[2] / "missions" / "open.toml"
+
+
+class InterruptedRecorder(Recorder):
+    """Ctrl-C while the companion is sending."""
+
+    whole: int | None = None
+    """Packets that were said whole since then; None before it."""
+
+    def said(self, time_s: float, raw: bytes) -> None:
+        if self.whole is None and time_s > 5.0:
+            self.whole = 0
+            os.kill(os.getpid(), signal.SIGINT)
+        super().said(time_s, raw)
+        if self.whole is not None:
+            self.whole += 1
+
+
+def test_the_record_of_an_interrupted_drive_ends_with_a_whole_tick(tmp_path: Path) -> None:
+    earlier = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        mission = load_mission(MISSION)
+        recorder = InterruptedRecorder(tmp_path / "run", mission, Settings(), 0, arm=True, start_us=0)
+        drive = Drive(mission, simulated(mission, None), Settings(), 0, recorder)
+        with pytest.raises(KeyboardInterrupt):
+            drive.run()
+    finally:
+        signal.signal(signal.SIGINT, earlier)
+    assert recorder.whole and drive.simulator.time_s < 7.0
+    recorder.close(ended_by=EndReason.STOPPED_BY_USER)
+    record = load_record(tmp_path / "run")
+    assert record.complete and record.meta.end_reason is EndReason.STOPPED_BY_USER
+    assert len(list(record.ticks())) > 50 and record.notes == []
