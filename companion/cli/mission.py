@@ -161,7 +161,7 @@ def command_text(command: DoCommand) -> str:
 
 def _ground(mission: Mission, resolved: ResolvedMission | None) -> list[str]:
     grid = mission.grid
-    size = f"fields of {grid.resolution_m:g} m" if not grid.by_footprint else _fields_by_rover(mission, resolved)
+    size = _fields_by_rover(mission, resolved) if grid.by_footprint else _fields(mission)
     if grid.size is not None and grid.home is not None:
         lines = [f"grid: {grid.size[0]} x {grid.size[1]} {size}, home is the middle of {place_text(grid.home)}"]
     else:
@@ -173,11 +173,18 @@ def _ground(mission: Mission, resolved: ResolvedMission | None) -> list[str]:
     return lines
 
 
+def _fields(mission: Mission, why: str = "") -> str:
+    """How large fields are, and what narrow ground that leaves open."""
+    side_m = mission.grid.resolution_m
+    gap_m = sure_gap_m(mission.rover, MappingSettings(), side_m)
+    return f"fields of {side_m:g} m{why}, for gaps of {gap_m:.1f} m or more"
+
+
 def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
-    """How large fields are where the file does not say, and what narrow ground that leaves open."""
+    """The same where the file does not say how large they are."""
     rover, size = mission.rover, _size_of(mission)
     if size is None:
-        return f"fields of {mission.grid.resolution_m:g} m (the default where the rover turns in arcs)"
+        return _fields(mission, " (the default where the rover turns in arcs)")
     if resolved is None:
         return f"fields of {size.fine_m:g} m (by the rover's size; larger on ground with more than {size.most})"
     side_m = resolved.ground.resolution_m

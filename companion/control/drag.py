@@ -5,7 +5,8 @@ is told, and closes it slowly, also when it is told to stop. Where such ground e
 it is held, the more room its positions get and the sooner it brakes.
 
 A rover that such ground holds, or has just let go, rolls on for seconds after it was told to stand, until the throttle
-is closed. Told to roll back, it stands after half the way.
+is closed. Told to roll back, it stands after half the way. It turns on for seconds, too: such ground also holds its
+turning, and ArduRover opens the steering as it does the throttle.
 
 Nouns: drag watch.
 """
@@ -74,7 +75,7 @@ class DragWatch:
         return self._held_m_s if drags else 0.0
 
     def closes(self) -> bool:
-        """Whether the throttle may still be open from when the ground held the rover."""
+        """Whether throttle and steering may still be open from when the ground held the rover."""
         return self._time_s - self._held_until_s < CLOSES_S
 
     def misleads(self) -> bool:
@@ -82,13 +83,13 @@ class DragWatch:
         return self._time_s - self._dragged_until_s < CLOSES_S
 
 
-def braked_harder(command: ControlCommand, view: LocalView, bounds: Bounds, *, closes: bool) -> ControlCommand:
-    """The command; or, where it tells a rover to stand that the ground holds and that rolls on, to roll back.
+def braked_harder(command: ControlCommand, view: LocalView, bounds: Bounds) -> ControlCommand:
+    """The command; or, where it tells a rover to stand that the ground holds or has held and that rolls on, to roll back.
 
-    ``closes``: or has held, see ``DragWatch``. It turns as told, and only as fast as it may be left alone with.
+    It turns as told, and only as fast as it may be left alone with.
     """
     told = command.setpoint
-    if not isinstance(told, GuidedVelocity) or not closes or view.forward_m_s < ROLLS_M_S:
+    if not isinstance(told, GuidedVelocity) or not view.lately_held or view.forward_m_s < ROLLS_M_S:
         return command
     if told.forward_m_s != 0.0 or (told.yaw_rate_rad_s != 0.0 and command.purpose is not Purpose.BRAKE):
         return command

@@ -32,7 +32,8 @@ class LocalView:
     ``told``: the setpoint of the tick before; None where there was none. ``lately``: the velocities told before.
     ``placed_s``: when a position was told last.
     ``held_m_s``: so much slower than its throttle would let it go on firm ground; ``dragged_m_s``: and for some time,
-    0 where that may have another reason. ``rolls_back``: it moves tail first.
+    0 where that may have another reason. ``lately_held``: its throttle and steering may still be open from that, see
+    ``drag``. ``rolls_back``: it moves tail first.
     ``following``: how it follows velocities, as far as is known. ``body``: its outline, if it is no circle.
     ``scans``: so many have been taken into the map.
     """
@@ -45,6 +46,7 @@ class LocalView:
     yaw_rate_rad_s: float = 0.0
     held_m_s: float = 0.0
     dragged_m_s: float = 0.0
+    lately_held: bool = False
     told: Setpoint | None = None
     lately: Told = ()
     placed_s: float = -math.inf

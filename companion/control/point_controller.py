@@ -19,7 +19,7 @@ from companion.control.reference_path import STEP_M, Points, ReferencePath
 from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, unseen_flank
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
-from companion.mapping.map_queries import ArcQueries, clearance_m, look_along
+from companion.mapping.map_queries import ArcQueries, Until, clearance_m, look_along
 from companion.settings import GuidanceSettings
 from companion.vehicle.commands import GuidedHeading, GuidedPosition
 
@@ -36,6 +36,8 @@ OVERRUN_M = 0.3
 STANDS_M_S = 0.1
 CREEPS_M = 0.1
 """It does not creep less far."""
+TOUCH_M = 0.05
+"""The rover keeps so much more than its radius free where it would come to stand."""
 SHOOTS_M = 0.1
 """A rover that the ground holds may go so much farther: then it counts as rolling, however slow it is."""
 CREEPS_NARROW_M = 0.4
@@ -260,8 +262,25 @@ def _would_touch(view: LocalView, needed_m: float) -> bool:
     pose = view.pose
     if view.speed_m_s <= view.settings.guidance.roll_out_m_s and view.further_m < SHOOTS_M:
         return False
+    radius_m = view.rover.radius_m
     ahead = pose.point.moved(pose.heading_rad, needed_m)
-    return look_along(view.evidence, pose.point, ahead, view.rover.radius_m + 0.05).clear_m < needed_m - 1e-6
+    if look_along(view.evidence, pose.point, ahead, radius_m + TOUCH_M).clear_m < needed_m - 1e-6:
+        return True
+    return view.lately_held and _would_touch_turning_on(view, needed_m)
+
+
+def _would_touch_turning_on(view: LocalView, needed_m: float) -> bool:
+    """Whether the rover would touch something if its turn rate lasts while it stops: the way bends more and more.
+
+    On average it then bends twice as much as now. Where ground ends that holds it, it goes and turns faster alike.
+    """
+    radius_m, arcs = view.rover.radius_m, ArcQueries(view.evidence, view.pose)
+    sharpest_per_m = 2.0 * view.yaw_rate_rad_s / max(view.speed_m_s, STANDS_M_S)
+    room_m = arcs.kept_room_m(radius_m + TOUCH_M, radius_m - TOUCH_M)
+    return not all(
+        arcs.arc_is_clear(view.pose.heading_rad, share * sharpest_per_m, room_m, needed_m, Until.BLOCKED)
+        for share in ROLL_SHARES
+    )
 
 
 def _would_touch_turning(view: LocalView, bearing_rad: float) -> bool:
@@ -270,7 +289,7 @@ def _would_touch_turning(view: LocalView, bearing_rad: float) -> bool:
     turn_rad = wrap_pi_rad(bearing_rad - pose.heading_rad)
     for share in ROLL_SHARES:
         there = pose.point.moved(pose.heading_rad + share * turn_rad, roll_m)
-        if look_along(view.evidence, pose.point, there, view.rover.radius_m + 0.05).clear_m < roll_m - 1e-6:
+        if look_along(view.evidence, pose.point, there, view.rover.radius_m + TOUCH_M).clear_m < roll_m - 1e-6:
             return True
     return False
 

@@ -548,12 +548,15 @@ class MissionExecutor:
         return way if way[0] == here and way[-1] == self._refuges[0].place.cell else ()
 
     def _tell_of_gaps(self) -> None:
-        """Where fields could be smaller: which gaps count as closed because they are not."""
+        """Which gaps count as closed, and what would open more, where something would."""
         rover, evidence = self._mission.rover, self.evidence
         size = field_size(rover, evidence.settings, narrow_sight=self._scan.is_narrow)
         side_m = evidence.base.resolution_m
-        if size is not None and side_m > 1.01 * size.fine_m:
-            gap_m = sure_gap_m(rover, evidence.settings, side_m)
+        gap_m = sure_gap_m(rover, evidence.settings, side_m)
+        if size is None:
+            needs = "single beams need wide ones, a lidar sees more" if self._scan.is_narrow else "arcs need wide ones"
+            self._notifier.tell(f"Gaps below {gap_m:.1f} m may count as closed: {needs}", Severity.INFO)
+        elif side_m > 1.01 * size.fine_m:
             text = f"Map fields of {side_m:.2g} m may close gaps below {gap_m:.1f} m; smaller ones open more"
             self._notifier.tell(text, Severity.INFO)
 

@@ -212,13 +212,13 @@ class MissionRun:
         told = None if self._told is None else self._told.setpoint
         full_m_s = full_throttle_m_s(self.vehicle.parameters)
         held_m_s = self._drag.held_m_s(self.vehicle.throttle, full_m_s, view)
-        view = changed(view, held_m_s=held_m_s, dragged_m_s=self._drag.dragged_m_s())
+        view = changed(view, held_m_s=held_m_s, dragged_m_s=self._drag.dragged_m_s(), lately_held=self._drag.closes())
         view = changed(view, told=told, lately=self._lately, placed_s=self._placed_s)
         if not self._drag.misleads():
             executor.learn(view)
         wanted = executor.guide(task, view)
         wanted = self.legs.guide(wanted, executor, view)
-        wanted = braked_harder(wanted, view, executor.layout.bounds, closes=self._drag.closes())
+        wanted = braked_harder(wanted, view, executor.layout.bounds)
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)
 
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:

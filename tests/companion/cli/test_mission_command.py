@@ -147,12 +147,13 @@ def test_it_says_how_large_fields_become_and_which_gaps_that_opens(tmp_path: Pat
     path.write_text("[[target]]\nnorth_m = 300\neast_m = 0\n")
     assert "no more than 250000; for narrower gaps give [grid] resolution_m or a smaller margin_m" in checked(path)
     path.write_text("[rover]\nturning_radius_m = 2\n[[target]]\nnorth_m = 30\neast_m = 0\n")
-    assert "fields of 1 m" in checked(path)
+    assert "fields of 1 m (the default where the rover turns in arcs), for gaps of 2.4 m or more" in checked(path)
 
 
 def test_options_say_what_a_ground_stations_file_cannot() -> None:
     output = checked(MISSIONS / "field.plan", "--resolution-m", "0.5", "--radius-m", "0.6", "--speed", "1.5")
-    assert "fields of 0.5 m, laid round" in output and "rover: radius 0.6 m, cruises at 1.5 m/s" in output
+    assert "fields of 0.5 m, for gaps of 2.2 m or more, laid round" in output
+    assert "rover: radius 0.6 m, cruises at 1.5 m/s" in output
     toml = MISSIONS / "rooms.toml"
     result = CliRunner().invoke(app, ["mission", "check", str(toml), "--radius-m", "0.6"])
     assert result.exit_code == 2

@@ -78,19 +78,19 @@ STAND = ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, 0.0), 0.0)
 
 
 def held_back() -> LocalView:
-    return replace(view(ground(), HERE, 0.3), held_m_s=1.0)
+    return replace(view(ground(), HERE, 0.3), held_m_s=1.0, lately_held=True)
 
 
 def test_a_rover_that_is_held_and_rolls_on_is_told_to_roll_back_until_it_stands() -> None:
     held = held_back()
-    back = braked_harder(STAND, held, Bounds(), closes=True)
+    back = braked_harder(STAND, held, Bounds())
     assert back.purpose is Purpose.BRAKE
     assert isinstance(back.setpoint, GuidedVelocity) and back.setpoint == GuidedVelocity(-BACK_M_S[0], 0.0)
-    assert braked_harder(STAND, held, Bounds(), closes=False) == STAND
+    assert braked_harder(STAND, replace(held, lately_held=False), Bounds()) == STAND
     turns = ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, 0.5), 0.0)
-    assert braked_harder(turns, held, Bounds(), closes=True).setpoint == GuidedVelocity(-BACK_M_S[0], 0.5)
+    assert braked_harder(turns, held, Bounds()).setpoint == GuidedVelocity(-BACK_M_S[0], 0.5)
     for stands in (replace(held, speed_m_s=0.05), replace(held, rolls_back=True)):
-        assert braked_harder(STAND, stands, Bounds(), closes=True) == STAND
+        assert braked_harder(STAND, stands, Bounds()) == STAND
 
 
 def test_the_throttle_may_still_be_open_for_a_while_after_the_ground_has_let_it_go() -> None:
@@ -113,7 +113,7 @@ def test_any_other_command_stays_as_it_is() -> None:
         GuidedHeading(1.0),
     ):
         command = ControlCommand(Purpose.DRIVE, setpoint, 1.0)
-        assert braked_harder(command, held_back(), Bounds(), closes=True) == command
+        assert braked_harder(command, held_back(), Bounds()) == command
 
 
 @pytest.mark.parametrize(("wall_m", "back_m_s"), [(7.0, 1.0), (3.5, 0.5), (2.0, 0.25), (0.6, 0.0)])
@@ -123,8 +123,8 @@ def test_it_is_told_no_more_than_it_may_be_left_alone_with(wall_m: float, back_m
     pose = Pose(8.0, 10.0, 0.0, 0.0)
     for east_m in np.arange(8.0, 12.0, 0.2):
         put(map_, pose.north_m - wall_m, float(east_m))
-    held = replace(view(map_, pose, 0.3), held_m_s=1.0)
-    assert braked_harder(STAND, held, Bounds(), closes=True).setpoint == GuidedVelocity(-back_m_s, 0.0)
+    held = replace(view(map_, pose, 0.3), held_m_s=1.0, lately_held=True)
+    assert braked_harder(STAND, held, Bounds()).setpoint == GuidedVelocity(-back_m_s, 0.0)
 
 
 def test_ground_drags_only_a_rover_that_is_held_much_and_for_long() -> None:

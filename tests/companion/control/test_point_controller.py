@@ -78,6 +78,22 @@ def test_it_brakes_for_what_it_would_touch():
     assert told(looked(), speed_m_s=2.0).purpose is Purpose.DRIVE
 
 
+@pytest.mark.parametrize("turns_rad_s", [-0.4, 0.4])
+def test_where_the_ground_held_it_it_brakes_for_what_it_would_touch_turning_on(turns_rad_s):
+    """A wall beside its way: it is no danger to a rover that turns as told, nor on the other side."""
+    east_m = 10.5 + math.copysign(0.75, turns_rad_s)
+    ground = looked([(10.0 + 0.1 * i, east_m, 0.05) for i in range(60)])
+    usual = replace(view(ground, speed_m_s=1.5), yaw_rate_rad_s=turns_rad_s)
+    for moment, brakes in (
+        (usual, False),
+        (replace(usual, lately_held=True), True),
+        (replace(usual, lately_held=True, yaw_rate_rad_s=0.0), False),
+        (replace(usual, lately_held=True, yaw_rate_rad_s=-turns_rad_s), False),
+    ):
+        answer = PointController().follow(northward(ground), moment)
+        assert (answer.purpose is Purpose.BRAKE) == brakes, moment
+
+
 def test_a_wall_right_ahead_is_blocked():
     ground = Ground()
     wall = [(11.2, 8.0 + 0.1 * i, 0.05) for i in range(51)]
