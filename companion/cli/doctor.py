@@ -168,16 +168,17 @@ def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Findi
     if home is None:
         return []
     rover, mapping = mission.rover, settings.mapping
-    size = field_size(rover, mapping)
+    sees = seen.vehicle.scan_ahead
+    size = field_size(rover, mapping, narrow_sight=sees is not None and sees.scan.is_narrow)
     try:
         side_m = resolve(mission, LocalFrame(home.point), NedPoint(0.0, 0.0), size=size).ground.resolution_m
     except (MissionError, MapError) as error:
         return [Finding("mission", Level.STOP, f"{error}.", "change the mission as it says")]
     doubtful = doubtful_places(mission, home.point)
     found = [Finding("far-target", Level.WARN, line, "look at the mission's places") for line in doubtful]
-    if size is not None and mission.grid.by_footprint:
-        gap_m = sure_gap_m(rover, finer_evidence(mapping, side_m), side_m)
-        says = f"The mission's fields are {side_m:.2g} m wide: the rover drives through gaps of {gap_m:.1f} m or more."
+    if mission.grid.by_footprint:
+        gap_m = sure_gap_m(rover, mapping if size is None else finer_evidence(mapping, side_m), side_m)
+        says = f"The mission's fields are {side_m:.3g} m wide: the rover drives through gaps of {gap_m:.1f} m or more."
         found.append(Finding("fields", Level.NOTE, says, "for narrower ones: resolution_m, docs/missions.md"))
     return found
 

@@ -184,17 +184,20 @@ def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
     """The same where the file does not say how large they are."""
     rover, size = mission.rover, _size_of(mission)
     if size is None:
-        return _fields(mission, " (the default where the rover turns in arcs)")
+        return _fields(mission, " (the default where the rover turns in arcs; smaller ones open narrower gaps)")
     if resolved is None:
         return f"fields of {size.fine_m:g} m (by the rover's size; larger on ground with more than {size.most})"
     side_m = resolved.ground.resolution_m
     gap_m = sure_gap_m(rover, finer_evidence(MappingSettings(), side_m), side_m)
-    size_of = f"fields of {side_m:.2g} m (by the rover's size"
+    size_of = f"fields of {side_m:.3g} m (by the rover's size"
     if side_m > size.fine_m:
         of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
         smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"
         size_of += f", and no more than {size.most}; for narrower gaps give {smaller}"
-    return f"{size_of}), for gaps of {gap_m:.1f} m or more"
+    beams_m = mission.grid.resolution_m
+    beams_gap_m = sure_gap_m(rover, MappingSettings(), beams_m)
+    beams = f"with single beams alone {beams_m:g} m, for {beams_gap_m:.1f} m"
+    return f"{size_of}), for gaps of {gap_m:.1f} m or more ({beams})"
 
 
 def _maps(mission: Mission, world: SimulatedWorld | None) -> list[str]:

@@ -84,7 +84,7 @@ class DragWatch:
 
 
 def braked_harder(command: ControlCommand, view: LocalView, bounds: Bounds) -> ControlCommand:
-    """The command; or, where it tells a rover to stand that the ground holds or has held and that rolls on, to roll back.
+    """The command; or, where it tells a rover to stand that the ground holds or held and that rolls on, to roll back.
 
     It turns as told, and only as fast as it may be left alone with.
     """

@@ -170,3 +170,36 @@ def test_planned_motions_keep_within_the_autopilots_limits(tmp_path: Path, contr
     step(desk)
     vehicle = fold(desk.run.vehicle, ParameterSeen(desk.now_s, "WP_SPEED", 1.2))
     assert desk.executor.view(vehicle, desk.now_s).rover.told_most_m_s == most_m_s
+
+
+WALLED = "".join(
+    f"[[keep_out]]\npolygon_fields = [{corners}]\n"
+    for corners in (
+        "[13, 5], [17, 5], [17, 6]",
+        "[13, 9], [17, 9], [17, 8]",
+        "[13, 5], [13, 9], [12, 9]",
+        "[17, 5], [17, 9], [18, 9]",
+    )
+)
+
+
+@pytest.mark.parametrize(
+    ("sees_all_round", "turning_radius_m", "field_m", "told"),
+    [
+        (True, 0.0, 1.0, "Map fields of 1 m may close gaps below 2.4 m; smaller ones open more"),
+        (True, 1.0, 1.0, "Map fields of 1 m may close gaps below 2.4 m; smaller ones open more"),
+        (True, 1.0, 0.25, "Gaps below 1.3 m may count as closed: arcs need wide ones"),
+        (False, 0.0, 0.25, "Gaps below 1.3 m may count as closed: single beams need wide ones, a lidar sees more"),
+    ],
+)
+def test_with_a_target_that_cannot_be_reached_it_says_which_gaps_count_as_closed(
+    tmp_path: Path, sees_all_round: bool, turning_radius_m: float, field_m: float, told: str
+) -> None:
+    desk = Desk(tmp_path, GATE + WALLED)
+    rover = replace(desk.mission.rover, turning_radius_m=turning_radius_m)
+    desk.mission = replace(desk.mission, rover=rover, grid=replace(desk.mission.grid, resolution_m=field_m))
+    if sees_all_round:
+        desk.stand(0.0, 0.0)
+    desk.begin()
+    step(desk)
+    assert desk.notices.texts[1].startswith("Unreachable: gate") and desk.notices.texts[2] == told
