@@ -177,7 +177,7 @@ def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Findi
     doubtful = doubtful_places(mission, home.point)
     found = [Finding("far-target", Level.WARN, line, "look at the mission's places") for line in doubtful]
     if mission.grid.by_footprint:
-        gap_m = sure_gap_m(rover, mapping if size is None else finer_evidence(mapping, side_m), side_m)
+        gap_m = sure_gap_m(rover, finer_evidence(mapping, side_m), side_m)
         says = f"The mission's fields are {side_m:.3g} m wide: the rover drives through gaps of {gap_m:.1f} m or more."
         found.append(Finding("fields", Level.NOTE, says, "for narrower ones: resolution_m, docs/missions.md"))
     return found

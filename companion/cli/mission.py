@@ -21,7 +21,7 @@ from companion.mission.do_commands import DoCommand
 from companion.mission.field_size import FieldSize, field_size, finer_evidence, sure_gap_m
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
-from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place
+from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place, RoverSpec
 from companion.mission.outline_hint import outline_hint
 from companion.mission.resolve import ResolvedMission, resolve
 from companion.mission.simulated_world import SimulatedWorld, check_start, doubtful_targets, world_of
@@ -100,7 +100,7 @@ def _try_resolve(mission: Mission) -> ResolvedMission | None:
         return None
 
 
-def _size_of(mission: Mission) -> FieldSize | None:
+def _size_of(mission: Mission) -> FieldSize:
     return field_size(mission.rover, MappingSettings())
 
 
@@ -173,31 +173,31 @@ def _ground(mission: Mission, resolved: ResolvedMission | None) -> list[str]:
     return lines
 
 
-def _fields(mission: Mission, why: str = "") -> str:
+def _fields(mission: Mission) -> str:
     """How large fields are, and what narrow ground that leaves open."""
     side_m = mission.grid.resolution_m
-    gap_m = sure_gap_m(mission.rover, MappingSettings(), side_m)
-    return f"fields of {side_m:g} m{why}, for gaps of {gap_m:.1f} m or more"
+    return f"fields of {side_m:g} m, for gaps of {sure_gap_m(mission.rover, MappingSettings(), side_m):.1f} m or more"
 
 
 def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
     """The same where the file does not say how large they are."""
     rover, size = mission.rover, _size_of(mission)
-    if size is None:
-        return _fields(mission, " (the default where the rover turns in arcs; smaller ones open narrower gaps)")
     if resolved is None:
         return f"fields of {size.fine_m:g} m (by the rover's size; larger on ground with more than {size.most})"
     side_m = resolved.ground.resolution_m
-    gap_m = sure_gap_m(rover, finer_evidence(MappingSettings(), side_m), side_m)
+    gap_m = _by_rover_gap_m(rover, side_m)
     size_of = f"fields of {side_m:.3g} m (by the rover's size"
     if side_m > size.fine_m:
         of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
         smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"
         size_of += f", and no more than {size.most}; for narrower gaps give {smaller}"
-    beams_m = mission.grid.resolution_m
-    beams_gap_m = sure_gap_m(rover, MappingSettings(), beams_m)
-    beams = f"with single beams alone {beams_m:g} m, for {beams_gap_m:.1f} m"
-    return f"{size_of}), for gaps of {gap_m:.1f} m or more ({beams})"
+    beams_m = field_size(rover, MappingSettings(), narrow_sight=True).fine_m
+    beams = f"; with single beams alone of {beams_m:g} m, for {_by_rover_gap_m(rover, beams_m):.1f} m"
+    return f"{size_of}), for gaps of {gap_m:.1f} m or more{beams if beams_m > side_m else ''}"
+
+
+def _by_rover_gap_m(rover: RoverSpec, side_m: float) -> float:
+    return sure_gap_m(rover, finer_evidence(MappingSettings(), side_m), side_m)
 
 
 def _maps(mission: Mission, world: SimulatedWorld | None) -> list[str]:

@@ -19,9 +19,9 @@ through. With fields of so many radii a rover of 0.7 m drives through 1.0 m."""
 MOST_FINE, MOST_FINE_PLANNED = 250_000, 1_000_000
 """Fields that may be small are so large that there are no more of them: searches take time. The second is for planned
 motions, which search less often."""
-USEFUL_M = 0.25
-"""For a rover that turns in arcs or sees with single beams smaller fields are of no use: with these it came through
-gates of 1.2 m in 17 of 18 drives, and through 1.0 m in 3."""
+WIDE_RADII = 0.72
+"""For a rover that turns in arcs or sees with single beams smaller fields are of no use: it needs wider gaps. With
+these it came through gates of 1.2 m in 17 of 18 drives, and through 1.0 m in 3."""
 FINER_M, FINER_SHARE = 0.05, 1.0 / 3.0
 """With small fields evidence is finer: this share of their side, and no less than FINER_M."""
 
@@ -41,17 +41,15 @@ class FieldSize:
         return min(largest_m, max(self.fine_m, math.sqrt(area_m2 / self.most)))
 
 
-def field_size(rover: RoverSpec, settings: MappingSettings, *, narrow_sight: bool = False) -> FieldSize | None:
-    """The size by the rover; None: the mission's default is as good.
+def field_size(rover: RoverSpec, settings: MappingSettings, *, narrow_sight: bool = False) -> FieldSize:
+    """The size by the rover, and by whether it sees with single thin beams alone.
 
-    For planned motions (``keeps`` "outline") no obstacle fits between two places of a field that are free. A rover that
-    turns in arcs, or sees with single thin beams, mostly needs more room than small fields would open.
+    For planned motions (``keeps`` "outline") no obstacle fits between two places of a field that are free.
     """
     if settings.keeps == "outline":
         return FieldSize(_in_steps(map_radius_m(rover, settings) / math.sqrt(2.0)), MOST_FINE_PLANNED)
-    if narrow_sight or rover.turning_radius_m > 0.0:
-        return None
-    return FieldSize(_in_steps(RADII * rover.radius_m), MOST_FINE)
+    radii = WIDE_RADII if narrow_sight or rover.turning_radius_m > 0.0 else RADII
+    return FieldSize(_in_steps(radii * rover.radius_m), MOST_FINE)
 
 
 def map_radius_m(rover: RoverSpec, settings: MappingSettings) -> float:

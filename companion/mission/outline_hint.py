@@ -29,6 +29,5 @@ def outline_hint(rover: RoverSpec, controller: str = "points") -> str:
 
 
 def _gap_m(rover: RoverSpec, settings: MappingSettings) -> float:
-    size = field_size(rover, settings)
-    side_m = 1.0 if size is None else size.fine_m
+    side_m = field_size(rover, settings).fine_m
     return sure_gap_m(rover, finer_evidence(settings, side_m), side_m)

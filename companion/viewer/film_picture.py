@@ -101,6 +101,8 @@ class FilmPicture:
         shape = (section.y1 - section.y0, section.x1 - section.x0)
         self._cells: NDArray[np.uint8] = np.full(shape, UNKNOWN, np.uint8)
         self._ground: Image.Image | None = None
+        self._shift: tuple[int, int] | None = (0, 0)
+        """Where the map's cells begin, counted from those of the scene's map."""
         self._font, self._small = (ImageFont.truetype(_font_file(), size) for size in (TEXT_PIXELS, NAME_PIXELS))
 
     @property
@@ -108,12 +110,26 @@ class FilmPicture:
         """Of each picture, in pixels."""
         return self._section.width, self._section.height + BAR_PIXELS
 
+    def begin_map(self, ground: Json | None) -> None:
+        """From now on the tiles are those of another map. One with cells of another size is not shown."""
+        self._cells.fill(UNKNOWN)
+        self._ground, scene = None, self._scene["map"]
+        self._shift = None
+        if ground is not None and ground["cell_m"] == scene["cell_m"]:
+            cell_m = scene["cell_m"]
+            self._shift = (
+                round((ground["west_m"] - scene["west_m"]) / cell_m),
+                round((ground["south_m"] - scene["south_m"]) / cell_m),
+            )
+
     def take_tiles(self, message: str) -> None:
         """Tiles of the map that have changed, as the report has them."""
-        section = self._section
+        if self._shift is None:
+            return
+        across, up = self._shift[0] - self._section.x0, self._shift[1] - self._section.y0
         for (column, row), runs in tiles_in(base64.b64decode(message)):
             tile = cells_of(runs).reshape(TILE, TILE)
-            x, y = column * TILE - section.x0, row * TILE - section.y0
+            x, y = column * TILE + across, row * TILE + up
             height, width = self._cells.shape
             x0, x1, y0, y1 = max(x, 0), min(x + TILE, width), max(y, 0), min(y + TILE, height)
             if x0 < x1 and y0 < y1:

@@ -21,6 +21,7 @@ from companion.replay.replay import ReplayObserver
 from companion.vehicle.commands import ChangeSpeed, GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.mode_names import mode_name
 from companion.vehicle.state import VehicleState
+from companion.viewer.steady_frame import SteadyFrame
 
 TIME = ("time_s", "time_utc")
 PLACE = ("north_m", "east_m", "latitude_deg", "longitude_deg")
@@ -45,6 +46,7 @@ class CsvReport(ReplayObserver):
         self._clock = clock
         self._files = ExitStack()
         self._position_s = -math.inf
+        self._steady = SteadyFrame()
         writers = []
         for name, head in FILES.items():
             file = self._files.enter_context(files[name].open("w", encoding="utf-8", newline=""))
@@ -63,7 +65,7 @@ class CsvReport(ReplayObserver):
         length = FieldPath(decision.path, 0.0).length_fields if decision.path else None
         row: list[Value] = [
             number,
-            *_place(companion.vehicle, None if pose is None else pose.point),
+            *self._place(companion.vehicle, None if pose is None else pose.point),
             target,
             str(decision.action),
             str(decision.part),
@@ -80,10 +82,10 @@ class CsvReport(ReplayObserver):
     def said(self, companion: Companion, time_s: float, raw: bytes) -> None:
         """See ``ReplayObserver``."""
         vehicle = companion.vehicle
-        nowhere = _place(vehicle, None)
+        nowhere: list[Value] = [None] * len(PLACE)
         match told_by(raw, None if vehicle.origin is None else vehicle.origin.point):
             case GuidedPosition(point):
-                row: list[Value] = ["position", *_place(vehicle, point)]
+                row: list[Value] = ["position", *self._place(vehicle, point)]
             case GuidedHeading(heading_rad):
                 row = ["heading", *nowhere, _degrees(heading_rad)]
             case GuidedVelocity(forward_m_s, yaw_rate_rad_s):
@@ -103,7 +105,7 @@ class CsvReport(ReplayObserver):
         self._position_s = vehicle.position.time_s
         turn_rad_s = None if vehicle.attitude is None else vehicle.attitude.yaw_rate_rad_s
         row: list[Value] = [
-            *_place(vehicle, status.pose.point),
+            *self._place(vehicle, status.pose.point),
             _degrees(status.pose.heading_rad % (2.0 * math.pi)),
             _rounded(vehicle.forward_m_s, 3),
             None if turn_rad_s is None else _degrees(turn_rad_s),
@@ -117,14 +119,15 @@ class CsvReport(ReplayObserver):
         values: list[Value] = [_rounded(time_s, 3), self._clock.utc(time_s), *row]
         return ["" if value is None else value for value in values]
 
-
-def _place(vehicle: VehicleState, point: NedPoint | None) -> list[Value]:
-    """North and east in metres; latitude and longitude where the origin of the local frame is known."""
-    if point is None:
-        return [None] * len(PLACE)
-    geo = None if vehicle.origin is None else LocalFrame(vehicle.origin.point).to_geo(point)
-    degrees: list[Value] = [None, None] if geo is None else [round(geo.lat_deg, 8), round(geo.lon_deg, 8)]
-    return [_rounded(point.north_m, 3), _rounded(point.east_m, 3), *degrees]
+    def _place(self, vehicle: VehicleState, point: NedPoint | None) -> list[Value]:
+        """North and east in metres of the run's first origin; latitude and longitude where an origin is known."""
+        if point is None:
+            return [None] * len(PLACE)
+        origin = None if vehicle.origin is None else vehicle.origin.point
+        self._steady.note(origin)
+        steady, geo = self._steady.point(point), None if origin is None else LocalFrame(origin).to_geo(point)
+        degrees: list[Value] = [None, None] if geo is None else [round(geo.lat_deg, 8), round(geo.lon_deg, 8)]
+        return [_rounded(steady.north_m, 3), _rounded(steady.east_m, 3), *degrees]
 
 
 def _degrees(angle_rad: float) -> Value:

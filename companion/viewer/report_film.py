@@ -70,11 +70,12 @@ class Film:
 
     def pictures(self) -> Iterator[Image.Image]:
         """A picture for each moment. To be asked for once."""
-        begins_s = max((t for t, _ in self._data.get("maps", ())), default=0.0)  # pictures have the last map
-        tiles = deque(one for one in self._data["tiles"] if one[0] >= begins_s)
+        maps, tiles = deque(self._data.get("maps", ())), deque(self._data["tiles"])
         for frame in self.moments():
-            while tiles and tiles[0][0] <= frame["t"]:
-                self._picture.take_tiles(tiles.popleft()[1])
+            while due := [one for one in (maps, tiles) if one and one[0][0] <= frame["t"]]:
+                first = min(due, key=lambda one: one[0][0])  # a map begins before its tiles
+                _, told = first.popleft()
+                self._picture.begin_map(told) if first is maps else self._picture.take_tiles(told)
             track = [place for t, place in self._track if t <= frame["t"]]
             contacts = [one for one in self._data["contacts"] if one["t"] <= frame["t"]]
             yield self._picture.drawn(frame, track, contacts)

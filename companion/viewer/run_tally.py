@@ -12,16 +12,17 @@ from companion.app import Companion
 from companion.core.frames import NedPoint
 from companion.navigation.field_step import Decision
 from companion.replay.replay import ReplayObserver
-from companion.safety.reasons import Doubt, RunPhase
+from companion.safety.reasons import Doubt, RunPhase, WaitReason
 from companion.viewer.energy import EnergyMeter
+from companion.viewer.frame import doing_of
 from companion.viewer.headway import Headway
+from companion.viewer.steady_frame import SteadyFrame
 
 MOVES_M_S = 0.05
 """A slower rover stands."""
 OLD_S = 1.0
 """A speed that was heard longer ago says nothing of now."""
-STOPPED = (RunPhase.STOPPED, RunPhase.STOPPED_AND_WAITING, RunPhase.WAY_BLOCKED)
-STOOD = (*STOPPED, RunPhase.WAITING)
+STOOD = ("stopped", "waiting")
 TRACK_S = 0.4
 
 
@@ -75,7 +76,8 @@ class RunTally(ReplayObserver):
         self.legs: list[Leg] = []
         self.energy = EnergyMeter()
         self.track: list[tuple[float, float, float]] = []
-        """Time, north and east."""
+        """Time, north and east of the run's first origin."""
+        self._steady = SteadyFrame()
         self._stood, self._doubted = _Spells(), _Spells()
         self._headway = Headway()
         self._stopped = False
@@ -115,22 +117,22 @@ class RunTally(ReplayObserver):
         self.energy.take(vehicle.battery)
         self._headway.note(companion, companion.status())
         self._note_stop(companion, time_s, step_s)
-        pose = companion.status().pose
-        if pose is not None and (not self.track or time_s - self.track[-1][0] >= TRACK_S - 1e-6):
-            self.track.append((round(time_s, 2), round(pose.north_m, 2), round(pose.east_m, 2)))
-        self._note_legs(companion, time_s, None if pose is None else pose.point)
+        places, pose = companion.mission_run.places, companion.status().pose
+        self._steady.note(None if places is None else places.origin)
+        here = None if pose is None else self._steady.point(pose.point)
+        if here is not None and (not self.track or time_s - self.track[-1][0] >= TRACK_S - 1e-6):
+            self.track.append((round(time_s, 2), round(here.north_m, 2), round(here.east_m, 2)))
+        self._note_legs(companion, time_s, here)
 
     def _note_stop(self, companion: Companion, time_s: float, step_s: float) -> None:
-        run = companion.mission_run
-        activity = run.activity
-        # What is awaited may change while the rover stands for one reason: that is one stop.
-        name = str(activity) if activity.phase is not RunPhase.STOPPED_AND_WAITING else f"stopped: {activity.reason}"
+        # As the large line has it. What is awaited may change while the rover stands for one reason: that is one stop.
+        doing, phase = doing_of(companion, companion.status(), self._headway), companion.mission_run.activity.phase
         hindrance = self._headway.hindrance
         held_up = "" if hindrance is None else hindrance.value
-        self._stood.note(name if activity.phase in STOOD else held_up, time_s, step_s)
-        doubt = None if run.stop is None else run.stop.reason
-        self._doubted.note(str(doubt) if doubt is not None and isinstance(doubt.kind, Doubt) else "", time_s, step_s)
-        stopped = activity.phase in STOPPED
+        name = doing["line"].replace("stopping: ", "stopped: ", 1)
+        self._stood.note(name if doing["state"] in STOOD else held_up, time_s, step_s)
+        self._doubted.note(_doubt(companion), time_s, step_s)
+        stopped = doing["state"] == "stopped" or phase is RunPhase.WAY_BLOCKED
         self.stops += stopped and not self._stopped
         self.stopped_s += step_s if stopped else 0.0
         self._stopped = stopped
@@ -149,3 +151,12 @@ class RunTally(ReplayObserver):
                 if point is not None and self._leg_from is not None:
                     leg.straight_m = self._leg_from.distance_m(point)
                 self._leg_from, self._leg_from_m = point, self.driven_m
+
+
+def _doubt(companion: Companion) -> str:
+    """What keeps the rover from moving as a watchdog has it, also while somebody else has it; empty for nothing."""
+    stop, awaited = companion.mission_run.stop, companion.mission_run.activity.awaited
+    if awaited is not None and awaited.kind is WaitReason.GOOD_DATA_AND:
+        return str(awaited.figures[0])
+    reason = None if stop is None else stop.reason
+    return str(reason) if reason is not None and isinstance(reason.kind, Doubt) else ""

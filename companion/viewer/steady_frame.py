@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.core.frames import GeoPoint, LocalFrame
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 
 Json = dict[str, Any]
 Place = list[float]
@@ -69,6 +69,10 @@ class SteadyFrame:
                 "west_m": round(ground["west_m"] + self._east_m, 3),
             },
         }
+
+    def point(self, point: NedPoint) -> NedPoint:
+        """One place."""
+        return NedPoint(point.north_m + self._north_m, point.east_m + self._east_m)
 
     def places(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rows north and east, in metres."""

@@ -4,7 +4,7 @@
 // the version of each tile and unpacks only those that differ from what is shown.
 
 import { between, lastNotAbove } from "viewer/geometry.js";
-import { split } from "viewer/tiles.js";
+import { split, TileMap } from "viewer/tiles.js";
 
 const NEWS_SHOWN = 500;
 const GIVEN_UP = new Set(["skipped", "unreachable", "timed out"]);
@@ -91,6 +91,7 @@ export class Record {
     if (this.maps.length > 1 && map !== this.shownMap) {
       this.shownMap = map;
       model.takeScene({ ...this.scene, map: this.maps[map][1] });
+      model.map = new TileMap(this.maps[map][1] ?? null); // another one, also where it has the same shape
       for (const history of this.tiles.values()) history.shown = -1;
     }
     for (const history of this.tiles.values()) {
@@ -125,6 +126,9 @@ function filled(frames) {
   });
 }
 
+// Whether somebody else drives the rover.
+const isLed = (frame) => !["nobody", "companion"].includes(frame.drives ?? "nobody");
+
 /** Marks for the timeline: [t, kind, text], ordered by time. */
 function eventsOf(record) {
   const events = [];
@@ -143,7 +147,7 @@ function eventsOf(record) {
       events.push({
         t: frame.t,
         kind: "stop",
-        name: heldUp ? "held up" : "stop",
+        name: heldUp ? "held up" : isLed(frame) ? "taken over" : "stop",
         text: frame.line,
         place: (frame.pose ?? before.pose)?.slice(0, 2),
       });

@@ -28,18 +28,17 @@ LONG = RoverSpec(0.6, rectangle=Footprint.rectangle(0.9, 0.7))
     ],
 )
 def test_the_rover_says_how_small(rover: RoverSpec, settings: MappingSettings, fine_m: float) -> None:
-    size = field_size(rover, settings)
-    assert size is not None and size.fine_m == pytest.approx(fine_m)
+    assert field_size(rover, settings).fine_m == pytest.approx(fine_m)
 
 
-def test_a_rover_that_cannot_use_narrow_gaps_has_no_small_fields() -> None:
-    assert field_size(RoverSpec(0.35, turning_radius_m=2.0), CIRCLE) is None
-    assert field_size(RoverSpec(0.35), CIRCLE, narrow_sight=True) is None
+def test_a_rover_that_needs_wider_gaps_has_larger_fields() -> None:
+    assert field_size(RoverSpec(0.35, turning_radius_m=2.0), CIRCLE).fine_m == 0.25
+    assert field_size(RoverSpec(0.35), CIRCLE, narrow_sight=True).fine_m == 0.25
+    assert field_size(RoverSpec(0.7), CIRCLE, narrow_sight=True).fine_m == 0.5
 
 
 def test_no_obstacle_fits_between_two_places_of_a_field_where_motions_are_planned() -> None:
-    size = field_size(LONG, OUTLINE)
-    assert size is not None and math.sqrt(2.0) * size.fine_m <= map_radius_m(LONG, OUTLINE)
+    assert math.sqrt(2.0) * field_size(LONG, OUTLINE).fine_m <= map_radius_m(LONG, OUTLINE)
 
 
 @given(st.floats(1.0, 1e7), st.floats(0.05, 2.0), st.integers(1000, 1_000_000))
@@ -74,4 +73,5 @@ def test_in_a_sure_gap_the_middles_of_fields_form_a_way_however_it_is_turned(
 
 def test_a_rover_of_the_default_size_drives_through_a_metre() -> None:
     assert sure_gap_m(RoverSpec(), finer_evidence(CIRCLE, 0.15), 0.15) == pytest.approx(1.0)
+    assert sure_gap_m(RoverSpec(), finer_evidence(CIRCLE, 0.25), 0.25) == pytest.approx(1.2)
     assert sure_gap_m(RoverSpec(), CIRCLE, 1.0) == pytest.approx(2.4)

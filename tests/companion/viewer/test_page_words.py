@@ -200,6 +200,18 @@ tell(new Record({ scene: {}, frames }).events.map((one) => [one.t, one.kind, one
     assert ran(tmp_path, script) == [[1, "stop", "stuck", [1, 0]], [4, "stop", "stuck", [4, 0]]]
 
 
+def test_the_mark_of_a_pilot_who_took_over_is_not_called_a_stop(tmp_path: Path) -> None:
+    script = """
+globalThis.Path2D = class {};
+const { Record } = await import("./record.js");
+const frames = [["driving", "companion"], ["waiting", "pilot"], ["driving", "companion"], ["stopped", "nobody"]].map(
+  ([state, drives], t) => ({ t, state, drives, line: state, pose: [t, 0, 0] })
+);
+tell(new Record({ scene: {}, frames }).events.map((one) => [one.t, one.name]));
+"""
+    assert ran(tmp_path, script) == [[1, "taken over"], [3, "stop"]]
+
+
 def test_a_button_that_would_do_nothing_is_locked_and_says_why(tmp_path: Path) -> None:
     script = """
 const { locks } = await import("./actions.js");

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 import pytest
-from PIL import ImageFont
+from PIL import Image, ImageFont
 
 from companion.viewer.film_picture import (
     CONTACT,
@@ -17,7 +18,11 @@ from companion.viewer.film_picture import (
     _font_file,
     section_of,
 )
+from companion.viewer.map_colours import CELL_COLOURS, UNKNOWN_COLOUR
+from companion.viewer.map_tiles import MOST_RUN, TILE
 from companion.viewer.report_film import MOST_PICTURES, Film, FilmError
+from companion.viewer.tile_kernels import FREE
+from companion.viewer.wire import tile_message
 
 GROUND = {"south_m": -50.0, "west_m": -50.0, "cell_m": 0.25, "columns": 400, "rows": 400, "tile": 64}
 SCENE: dict[str, Any] = {
@@ -67,6 +72,31 @@ def test_the_mark_of_a_target_shows_what_has_become_of_it() -> None:
 
     assert spots("reached") == [REACHED] * 2 and spots("pending") == spots("skipped") == [GOAL] * 2
     assert spots("unreachable") == [HALO, CONTACT], "a cross on a disc"
+
+
+def test_a_map_that_is_begun_anew_begins_empty_and_where_it_lies() -> None:
+    """From the second map on the ground of the first is gone, and its own tiles lie 16 m farther east."""
+    frames = [
+        {"t": float(t), "pose": [0.0, 0.0, 0.0], "speed": 1.0, "path": [], "statuses": ["pending"], "movers": [],
+         "line": "driving", "state": "driving"}
+        for t in range(4)
+    ]  # fmt: skip
+    free = base64.b64encode(
+        tile_message([((3, 3), bytes([FREE << 5 | MOST_RUN - 1]) * (TILE**2 // MOST_RUN))])
+    ).decode()
+    moved = {**GROUND, "west_m": GROUND["west_m"] + 0.25 * TILE}
+    tiles, maps = [(1.0, free), (3.0, free)], [(1.0, GROUND), (2.0, moved)]
+    made = Film({"scene": SCENE, "frames": frames, "tiles": tiles, "contacts": [], "maps": maps})
+    section = section_of(SCENE, [(0.0, 0.0)] * 4 + [(0.0, 30.0)])
+
+    def ground(picture: Image.Image, east_m: float) -> object:
+        x = round(((east_m + 50.0) / 0.25 - section.x0) * section.scale)
+        y = round(section.height - ((6.0 + 50.0) / 0.25 - section.y0) * section.scale)
+        return picture.getpixel((x, y))
+
+    seen = [[ground(one, east_m) for east_m in (6.0, 22.0)] for one in made.pictures()]
+    known, unknown = tuple(CELL_COLOURS[FREE]), UNKNOWN_COLOUR
+    assert seen == [[unknown] * 2, [known, unknown], [unknown] * 2, [unknown, known]]
 
 
 @pytest.mark.parametrize("places", [[(0.0, 0.0)], [(0.0, 0.0), (90.0, 1.0)], [(-300.0, 5.0), (10.0, 400.0)]])

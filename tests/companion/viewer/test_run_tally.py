@@ -7,21 +7,31 @@ from typing import Any, cast
 
 import pytest
 
-from companion.core.frames import Pose
-from companion.safety.reasons import Activity, RunPhase
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
+from companion.safety.reasons import Activity, LatchReason, Reason, RunPhase, WaitReason
 from companion.viewer.run_tally import RunTally
 
+DRIVING = Activity(RunPhase.DRIVING)
 
-def moment(time_s: float, heard_s: float) -> Any:
+
+def moment(time_s: float, heard_s: float, activity: Activity = DRIVING) -> Any:
     """The companion at a time, in its own clock 100 s later; its newest position, 2 m/s, of ``heard_s``."""
     position = SimpleNamespace(time_s=100.0 + heard_s)
     vehicle = SimpleNamespace(speed_m_s=2.0, forward_m_s=2.0, battery=None, position=position)
-    run = SimpleNamespace(activity=Activity(RunPhase.DRIVING), stop=None, is_driving=False)
-    status = SimpleNamespace(time_s=100.0 + time_s, pose=None, activity=run.activity, target="gate", decision=None)
+    run = SimpleNamespace(activity=activity, stop=None, is_driving=False, places=None, taken_over=False)
+    status = SimpleNamespace(
+        time_s=100.0 + time_s, pose=None, activity=activity, target="gate", decision=None, doing=str(activity)
+    )
     return cast(
         Any,
         SimpleNamespace(
-            vehicle=vehicle, mission_run=run, status=lambda: status, statuses=lambda: [("gate", "")], driver=None
+            vehicle=vehicle,
+            mission_run=run,
+            status=lambda: status,
+            statuses=lambda: [("gate", "")],
+            driver=None,
+            executor=None,
+            outcome=SimpleNamespace(broken_off=None),
         ),
     )
 
@@ -43,3 +53,28 @@ def test_a_rover_that_is_led_and_does_not_get_on_has_a_row_in_the_table() -> Non
         tally.ticked(now, 0.1 * tick)
     spell = tally.stood["making way for something that moves"]
     assert spell.times == 1 and spell.seconds == pytest.approx(17.0, abs=0.3) and tally.stops == 0
+
+
+def test_data_that_is_missing_is_told_as_the_large_line_has_it_whoever_has_the_rover() -> None:
+    """The mode has been changed, and good data is awaited, too."""
+    awaited = Reason(WaitReason.GOOD_DATA_AND, ("position silent", Reason(WaitReason.PERSON_SETS_GUIDED_AGAIN)))
+    activity = Activity(RunPhase.STOPPED_AND_WAITING, Reason(LatchReason.OTHER_MODE, ("GUIDED",)), awaited)
+    tally = RunTally()
+    for tick in range(1, 101):
+        now = moment(0.1 * tick, 0.1 * tick, activity)
+        now.vehicle.forward_m_s = 2.0 if tick < 20 else 0.0  # it still rolls
+        tally.ticked(now, 0.1 * tick)
+    assert list(tally.stood) == ["stopped: position silent"] and tally.stops == 1
+    assert tally.stood["stopped: position silent"].seconds == pytest.approx(10.0, abs=0.2)
+    assert tally.watchdogs["position silent"].seconds == pytest.approx(10.0, abs=0.2)
+
+
+def test_the_track_counts_from_the_first_origin_also_after_the_autopilot_has_got_another_one() -> None:
+    tally, first = RunTally(), GeoPoint(53.0, 23.0)
+    there = LocalFrame(first).to_geo(NedPoint(24.0, 0.0))
+    for tick, origin, north_m in ((1, first, 24.0), (2, there, 0.0), (3, there, 1.0)):
+        now = moment(tick, tick)
+        now.mission_run.places = SimpleNamespace(origin=origin)
+        now.status().pose = Pose(north_m, 0.0, 0.0, 100.0 + tick)
+        tally.ticked(now, float(tick))
+    assert [north_m for _, north_m, _ in tally.track] == pytest.approx([24.0, 24.0, 25.0], abs=0.02)
