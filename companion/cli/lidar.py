@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
@@ -14,7 +16,7 @@ from companion.cli.inputs import EXIT_BAD_INPUT, OutputError
 from companion.cli.lidars import lidars_given
 from companion.cli.state import StateFiles
 from companion.core.clock import Clock, WallClock
-from companion.lidar.reader import Lidars, lidars_on
+from companion.lidar.reader import LidarReader, Lidars, lidars_on
 from companion.lidar.serial_port import open_ports
 from companion.lidar.spec import FORM, LidarError
 from companion.lidar.trouble import trouble
@@ -23,7 +25,7 @@ from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError, open_link
 
 STEP_S = 0.02
-SILENT_S = 1.0
+TURN_SILENT_S, LINK_SILENT_S = 1.0, 3.0
 
 
 def lidar(
@@ -60,7 +62,7 @@ def lidar(
 
 
 def _publish(lidars: Lidars, publisher: ObstaclePublisher, link: ByteLink, clock: Clock) -> None:
-    """Until a signal; tells when scans come and when they stay away."""
+    """Until a signal; tells when scans come and when they stay away, and the same of who listens."""
     stop: list[int] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:
@@ -68,20 +70,49 @@ def _publish(lidars: Lidars, publisher: ObstaclePublisher, link: ByteLink, clock
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
-    now_s = heard_s = clock.now_s()
-    talks: bool | None = None
+    now_s = clock.now_s()
+    turns, answers = _Signs(now_s, TURN_SILENT_S, None), _Signs(now_s, LINK_SILENT_S, talks=False)
     while not stop:
-        publisher.hear(link.read())
+        if data := link.read():
+            publisher.hear(data)
+            if answers.come(now_s):
+                typer.echo(f"{link.description}: heard")
         link.write(publisher.heartbeat(now_s))
         for seen in lidars.poll(now_s):
-            heard_s = now_s
             link.write(publisher.scan(seen.scan))
-            if not talks:
-                talks = True
+            if turns.come(now_s):
                 typer.echo(f"{len(seen.scan.bearing_rad)} readings a turn")
-        if talks is not False and now_s - heard_s > SILENT_S:
-            talks = False
-            why = trouble(lidars.readers[0]) or "look at its power and cable"
-            typer.echo(f"no whole turn for {SILENT_S:g} s: {why}")
+        if turns.stay_away(now_s):
+            typer.echo(f"no whole turn for {TURN_SILENT_S:g} s: {_why_not(lidars.readers[0])}")
+        if answers.stay_away(now_s):
+            typer.echo(f"{link.description}: nothing heard for {LINK_SILENT_S:g} s")
         clock.sleep_until_s(now_s + STEP_S)
         now_s = clock.now_s()
+
+
+@dataclass
+class _Signs:
+    """Of something that comes again and again. ``talks``: whether it comes; None while that is not known."""
+
+    heard_s: float
+    silent_s: float
+    talks: bool | None
+
+    def come(self, now_s: float) -> bool:
+        """It has come; whether that is news."""
+        self.heard_s, before, self.talks = now_s, self.talks, True
+        return not before
+
+    def stay_away(self, now_s: float) -> bool:
+        """Whether it is news that it has not come for so long."""
+        if self.talks is False or now_s - self.heard_s <= self.silent_s:
+            return False
+        self.talks = False
+        return True
+
+
+def _why_not(reader: LidarReader) -> str:
+    port = reader.spec.port
+    if not os.path.exists(port):
+        return f"{reader.name}: {port} is gone; look at its cable"
+    return str(trouble(reader) or f"{reader.name} on {port}: look at its power and cable")

@@ -52,7 +52,7 @@ from companion.mapping.evidence_map import EvidenceMap, forget, integrate, look_
 from companion.mapping.map_files import save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.do_commands import DoCommand
-from companion.mission.field_size import field_size, sure_gap_m
+from companion.mission.field_size import field_size, finer_evidence, sure_gap_m
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
@@ -554,7 +554,11 @@ class MissionExecutor:
         side_m = evidence.base.resolution_m
         gap_m = sure_gap_m(rover, evidence.settings, side_m)
         if side_m > 1.01 * size.fine_m:
-            text = f"Map fields of {side_m:.3g} m may close gaps below {gap_m:.1f} m; smaller ones open more"
+            fine_m = sure_gap_m(rover, finer_evidence(evidence.settings, size.fine_m), size.fine_m)
+            text = (
+                f"Map fields of {side_m:.3g} m may close gaps below {gap_m:.1f} m; smaller ones open more, "
+                f"of {size.fine_m:.2g} m down to {fine_m:.1f} m"
+            )
             self._notifier.tell(text, Severity.INFO)
         elif self._scan.is_narrow or rover.turning_radius_m > 0.0:
             needs = "single beams need wide ones, a lidar sees more" if self._scan.is_narrow else "arcs need wide ones"

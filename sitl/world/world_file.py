@@ -34,6 +34,8 @@ from sitl.world.world import FIRM, TOP_SPEED_M_S, Ground, World
 
 FINE_M = 0.1
 MAX_FIELDS = 10_000_000
+OVER_M = 0.5
+"""A shape that reaches no farther beyond the edge may be a wall along it."""
 Mask = NDArray[np.bool_]
 Seconds = Annotated[float, Field(ge=0.0, le=1e6)]
 
@@ -202,14 +204,21 @@ class _Drawing:
         shape = named(self.path, kind, number, item.shape, MapError)
         height, width = self.obstacles.shape
         size_m = (width * self.resolution_m, height * self.resolution_m)
-        if not shape.intersects(shapely.box(0.0, 0.0, *size_m)):
-            # size_m is east first, as pictures are, places are north first, as in missions.
-            swapped = shape.intersects(shapely.box(0.0, 0.0, *size_m[::-1]))
-            remedy = "places are [north, east], are they the other way round?" if swapped else "move it inside"
-            raise MapError(
-                f"{self.path}: {kind} {number}: lies outside the world, "
-                f"{size_m[0]:g} m east and {size_m[1]:g} m north; {remedy}"
+        # size_m is east first, as pictures are, places are north first, as in missions.
+        here, turned = (shapely.box(0.0, 0.0, *sides_m) for sides_m in (size_m, size_m[::-1]))
+        says = remedy = ""
+        if not shape.intersects(here):
+            says, remedy = "lies outside", "move it inside"
+            if shape.intersects(turned):
+                remedy = "places are [north, east], are they the other way round?"
+        elif not shape.within(here.buffer(OVER_M)) and shape.within(turned.buffer(OVER_M)):
+            says, remedy = (
+                "reaches beyond",
+                "size_m is [east, north] and places are [north, east]; turn one, or end it here",
             )
+        if says:
+            world = f"the world, {size_m[0]:g} m east and {size_m[1]:g} m north"
+            raise MapError(f"{self.path}: {kind} {number}: {says} {world}; {remedy}")
         return shape
 
 

@@ -80,9 +80,10 @@ def test_the_command_publishes_over_udp_to_an_autopilot_which_passes_it_on(tmp_p
             wait_until(lambda: told.extend(of_lidar(world)) or len(told) >= 5)
             child.send_signal(signal.SIGTERM)
             assert child.wait(timeout=PATIENCE_S) == 0
-            assert child.stdout.read().startswith("publishing lidar 1 (LD19) on udpout:")
+            said = child.stdout.read()
     finally:
         world.close()
+    assert said.startswith("publishing lidar 1 (LD19) on udpout:") and f"{link}: heard\n" in said, said
     last = obstacle_distance(told[-1], 0.0)
     assert last is not None
     assert abs(float(last.range_m[0]) - 4.0) < 0.1 and told[-1].get_srcSystem() == 1

@@ -172,6 +172,10 @@ def test_a_ros_map_says_how_large_its_fields_are(tmp_path: Path) -> None:
         (SIZE + "[[obstacle]]\nline_m = [[1, 1], [1, 2]]\n", "a line needs line_m and width_m"),
         (SIZE + "[[obstacle]]\nnorth_m = 3.0\nradius_m = 1.0\n", "a circle needs north_m, east_m and radius_m"),
         (SIZE + POST.replace("10.0", "99.0"), "obstacle 1: lies outside the world, 20 m east and 15 m north"),
+        (
+            SIZE + "[[obstacle]]\nline_m = [[1.0, 1.0], [19.0, 1.0]]\nwidth_m = 0.3\n",
+            "obstacle 1: reaches beyond the world, 20 m east and 15 m north; size_m is [east, north]",
+        ),
         (SIZE + POST + 'material = "wood"\n', "obstacle 1.material"),
         (SIZE + POST + "colour = 3\n", "unknown key"),
         (SIZE + POST.replace("obstacle", "door"), "door 1.open_s: field required"),
