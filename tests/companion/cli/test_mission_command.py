@@ -143,13 +143,13 @@ def test_run_warns_in_the_same_words_before_it_opens_the_link(tmp_path: Path) ->
 def test_it_says_how_large_fields_become_and_which_gaps_that_opens(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_text("[[target]]\nnorth_m = 30\neast_m = 0\n")
-    beams = "with single beams alone of 0.5 m, for 1.7 m"
+    beams = "with single beams alone of 1 m, for 2.4 m"
     told = f"grid: fields of 0.15 m (by the rover's size), for gaps of 1.0 m or more; {beams}, laid round"
     assert told in checked(path)
     path.write_text("[[target]]\nnorth_m = 300\neast_m = 0\n")
     assert "no more than 250000; for narrower gaps give [grid] resolution_m or a smaller margin_m" in checked(path)
     path.write_text("[rover]\nturning_radius_m = 2\n[[target]]\nnorth_m = 30\neast_m = 0\n")
-    assert "fields of 0.25 m (by the rover's size), for gaps of 1.2 m or more, laid round" in checked(path)
+    assert "fields of 0.25 m (by the rover's size), for gaps of 1.2 m or more;" in checked(path)
 
 
 def test_options_say_what_a_ground_stations_file_cannot() -> None:

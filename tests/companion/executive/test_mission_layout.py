@@ -82,7 +82,7 @@ def test_fields_and_evidence_follow_from_the_rover() -> None:
         assert evidence.base.resolution_m == pytest.approx(side_m)
         assert evidence.evidence_m == pytest.approx(evidence_m, abs=0.001)
     with_beams = lay(wanted, MappingSettings(), ORIGIN, HOME, POSE, narrow_sight=True).evidence
-    assert with_beams.base.resolution_m == pytest.approx(0.85)
+    assert with_beams.base.resolution_m == 1.0 and with_beams.evidence_m == 0.125
 
 
 def test_another_fence_leaves_small_fields_as_they_are() -> None:
