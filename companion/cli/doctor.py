@@ -169,7 +169,8 @@ def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Findi
         return []
     rover, mapping = mission.rover, settings.mapping
     sees = seen.vehicle.scan_ahead
-    size = field_size(rover, mapping, narrow_sight=sees is not None and sees.scan.is_narrow)
+    narrow = sees is not None and sees.scan.is_narrow
+    size = field_size(rover, mapping, narrow_sight=narrow)
     try:
         side_m = resolve(mission, LocalFrame(home.point), NedPoint(0.0, 0.0), size=size).ground.resolution_m
     except (MissionError, MapError) as error:
@@ -178,8 +179,10 @@ def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Findi
     found = [Finding("far-target", Level.WARN, line, "look at the mission's places") for line in doubtful]
     if mission.grid.by_footprint:
         gap_m = sure_gap_m(rover, finer_evidence(mapping, side_m), side_m)
+        wide = side_m <= 1.01 * size.fine_m and (narrow or rover.turning_radius_m > 0.0)
+        remedy = "arcs and single beams need such" if wide else "for narrower ones: resolution_m"
         says = f"The mission's fields are {side_m:.3g} m wide: the rover drives through gaps of {gap_m:.1f} m or more."
-        found.append(Finding("fields", Level.NOTE, says, "for narrower ones: resolution_m, docs/missions.md"))
+        found.append(Finding("fields", Level.NOTE, says, f"{remedy}, docs/missions.md"))
     return found
 
 

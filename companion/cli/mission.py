@@ -24,6 +24,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place, RoverSpec
 from companion.mission.outline_hint import outline_hint
 from companion.mission.resolve import ResolvedMission, resolve
+from companion.mission.sensor_tables import BEAMS
 from companion.mission.simulated_world import SimulatedWorld, check_start, doubtful_targets, world_of
 from companion.settings import MappingSettings
 
@@ -101,7 +102,9 @@ def _try_resolve(mission: Mission) -> ResolvedMission | None:
 
 
 def _size_of(mission: Mission) -> FieldSize:
-    return field_size(mission.rover, MappingSettings())
+    """By the rover, and by whether the mission is to be simulated with single beams alone."""
+    narrow = mission.sitl is not None and mission.sitl.sensors == BEAMS
+    return field_size(mission.rover, MappingSettings(), narrow_sight=narrow)
 
 
 def _all_places(mission: Mission) -> list[Place]:
@@ -176,7 +179,7 @@ def _ground(mission: Mission, resolved: ResolvedMission | None) -> list[str]:
 def _fields(mission: Mission) -> str:
     """How large fields are, and what narrow ground that leaves open."""
     side_m = mission.grid.resolution_m
-    return f"fields of {side_m:g} m, for gaps of {sure_gap_m(mission.rover, MappingSettings(), side_m):.1f} m or more"
+    return f"fields of {side_m:g} m, for gaps of {_gap_m(mission.rover, side_m):.1f} m or more"
 
 
 def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
@@ -185,18 +188,18 @@ def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
     if resolved is None:
         return f"fields of {size.fine_m:g} m (by the rover's size; larger on ground with more than {size.most})"
     side_m = resolved.ground.resolution_m
-    gap_m = _by_rover_gap_m(rover, side_m)
+    gap_m = _gap_m(rover, side_m)
     size_of = f"fields of {side_m:.3g} m (by the rover's size"
     if side_m > size.fine_m:
         of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
         smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"
         size_of += f", and no more than {size.most}; for narrower gaps give {smaller}"
     beams_m = field_size(rover, MappingSettings(), narrow_sight=True).fine_m
-    beams = f"; with single beams alone of {beams_m:g} m, for {_by_rover_gap_m(rover, beams_m):.1f} m"
+    beams = f"; with single beams alone of {beams_m:g} m, for {_gap_m(rover, beams_m):.1f} m"
     return f"{size_of}), for gaps of {gap_m:.1f} m or more{beams if beams_m > side_m else ''}"
 
 
-def _by_rover_gap_m(rover: RoverSpec, side_m: float) -> float:
+def _gap_m(rover: RoverSpec, side_m: float) -> float:
     return sure_gap_m(rover, finer_evidence(MappingSettings(), side_m), side_m)
 
 

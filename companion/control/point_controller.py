@@ -38,6 +38,8 @@ CREEPS_M = 0.1
 """It does not creep less far."""
 TOUCH_M = 0.05
 """The rover keeps so much more than its radius free where it would come to stand."""
+TURNS_ON_RAD_S = 0.1
+"""The steering of a rover that turns more slowly has not been opened far by ground that held it."""
 SHOOTS_M = 0.1
 """A rover that the ground holds may go so much farther: then it counts as rolling, however slow it is."""
 CREEPS_NARROW_M = 0.4
@@ -266,7 +268,8 @@ def _would_touch(view: LocalView, needed_m: float) -> bool:
     ahead = pose.point.moved(pose.heading_rad, needed_m)
     if look_along(view.evidence, pose.point, ahead, radius_m + TOUCH_M).clear_m < needed_m - 1e-6:
         return True
-    return view.lately_held and _would_touch_turning_on(view, needed_m)
+    turns_on = view.lately_held and abs(view.yaw_rate_rad_s) >= TURNS_ON_RAD_S
+    return turns_on and _would_touch_turning_on(view, needed_m)
 
 
 def _would_touch_turning_on(view: LocalView, needed_m: float) -> bool:

@@ -153,7 +153,7 @@ def _laid(
     rover = mission.rover
     size = field_size(rover, settings, narrow_sight=narrow)
     resolved = resolve(mission, frame, frame.to_ned(home), fence, size)
-    if mission.grid.by_footprint:
+    if mission.grid.by_footprint or settings.keeps == "circle":
         settings = finer_evidence(settings, resolved.ground.resolution_m)
     return resolved, new_map(_base(mission, resolved), map_radius_m(rover, settings), settings)
 

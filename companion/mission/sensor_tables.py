@@ -12,7 +12,8 @@ from companion.storage.toml_file import read_table
 from companion.storage.validation import describe_first
 
 NONE = "none"
-NAMED = ("lidar-90", "lidar-360", "beams", NONE)
+BEAMS = "beams"
+NAMED = ("lidar-90", "lidar-360", BEAMS, NONE)
 """Named suites."""
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]

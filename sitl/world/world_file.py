@@ -34,8 +34,8 @@ from sitl.world.world import FIRM, TOP_SPEED_M_S, Ground, World
 
 FINE_M = 0.1
 MAX_FIELDS = 10_000_000
-OVER_M = 0.5
-"""A shape that reaches no farther beyond the edge may be a wall along it."""
+MOSTLY = 0.4
+"""A shape of which less lies in the world was hardly meant so: one on the edge has half of it there."""
 Mask = NDArray[np.bool_]
 Seconds = Annotated[float, Field(ge=0.0, le=1e6)]
 
@@ -211,11 +211,8 @@ class _Drawing:
             says, remedy = "lies outside", "move it inside"
             if shape.intersects(turned):
                 remedy = "places are [north, east], are they the other way round?"
-        elif not shape.within(here.buffer(OVER_M)) and shape.within(turned.buffer(OVER_M)):
-            says, remedy = (
-                "reaches beyond",
-                "size_m is [east, north] and places are [north, east]; turn one, or end it here",
-            )
+        elif shape.intersection(here).area < MOSTLY * shape.area and shape.within(turned):
+            says, remedy = "lies mostly outside", "size_m is [east, north], places are [north, east]: is one turned?"
         if says:
             world = f"the world, {size_m[0]:g} m east and {size_m[1]:g} m north"
             raise MapError(f"{self.path}: {kind} {number}: {says} {world}; {remedy}")

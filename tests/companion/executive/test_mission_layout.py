@@ -81,6 +81,9 @@ def test_fields_and_evidence_follow_from_the_rover() -> None:
         evidence = lay(wanted, MappingSettings(keeps=keeps), ORIGIN, HOME, POSE).evidence
         assert evidence.base.resolution_m == pytest.approx(side_m)
         assert evidence.evidence_m == pytest.approx(evidence_m, abs=0.001)
+    small = replace(wanted, rover=RoverSpec(), grid=replace(wanted.grid, by_footprint=False, resolution_m=0.15))
+    given = lay(small, MappingSettings(), ORIGIN, HOME, POSE).evidence
+    assert given.evidence_m == pytest.approx(0.05), "who gives small fields drives through the same gaps"
     with_beams = lay(wanted, MappingSettings(), ORIGIN, HOME, POSE, narrow_sight=True).evidence
     assert with_beams.base.resolution_m == 1.0 and with_beams.evidence_m == 0.125
 

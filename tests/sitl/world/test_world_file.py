@@ -173,8 +173,8 @@ def test_a_ros_map_says_how_large_its_fields_are(tmp_path: Path) -> None:
         (SIZE + "[[obstacle]]\nnorth_m = 3.0\nradius_m = 1.0\n", "a circle needs north_m, east_m and radius_m"),
         (SIZE + POST.replace("10.0", "99.0"), "obstacle 1: lies outside the world, 20 m east and 15 m north"),
         (
-            SIZE + "[[obstacle]]\nline_m = [[1.0, 1.0], [19.0, 1.0]]\nwidth_m = 0.3\n",
-            "obstacle 1: reaches beyond the world, 20 m east and 15 m north; size_m is [east, north]",
+            SIZE + "[[obstacle]]\nline_m = [[14.0, 1.0], [19.0, 1.0]]\nwidth_m = 0.3\n",
+            "obstacle 1: lies mostly outside the world, 20 m east and 15 m north; size_m is [east, north]",
         ),
         (SIZE + POST + 'material = "wood"\n', "obstacle 1.material"),
         (SIZE + POST + "colour = 3\n", "unknown key"),
