@@ -103,8 +103,11 @@ def _try_resolve(mission: Mission) -> ResolvedMission | None:
 
 def _size_of(mission: Mission) -> FieldSize:
     """By the rover, and by whether the mission is to be simulated with single beams alone."""
-    narrow = mission.sitl is not None and mission.sitl.sensors == BEAMS
-    return field_size(mission.rover, MappingSettings(), narrow_sight=narrow)
+    return field_size(mission.rover, MappingSettings(), narrow_sight=_has_beams(mission))
+
+
+def _has_beams(mission: Mission) -> bool:
+    return mission.sitl is not None and mission.sitl.sensors == BEAMS
 
 
 def _all_places(mission: Mission) -> list[Place]:
@@ -185,11 +188,12 @@ def _fields(mission: Mission) -> str:
 def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
     """The same where the file does not say how large they are."""
     rover, size = mission.rover, _size_of(mission)
+    why = "as single beams need" if _has_beams(mission) else "by the rover's size"
     if resolved is None:
-        return f"fields of {size.fine_m:g} m (by the rover's size; larger on ground with more than {size.most})"
+        return f"fields of {size.fine_m:g} m ({why}; larger on ground with more than {size.most})"
     side_m = resolved.ground.resolution_m
     gap_m = _gap_m(rover, side_m)
-    size_of = f"fields of {side_m:.3g} m (by the rover's size"
+    size_of = f"fields of {side_m:.3g} m ({why}"
     if side_m > size.fine_m:
         of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
         smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"

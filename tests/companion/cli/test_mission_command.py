@@ -148,6 +148,8 @@ def test_it_says_how_large_fields_become_and_which_gaps_that_opens(tmp_path: Pat
     assert told in checked(path)
     path.write_text("[[target]]\nnorth_m = 300\neast_m = 0\n")
     assert "no more than 250000; for narrower gaps give [grid] resolution_m or a smaller margin_m" in checked(path)
+    path.write_text('[[target]]\nnorth_m = 30\neast_m = 0\n[sitl]\nsensors = "beams"\n')
+    assert "fields of 1 m (as single beams need), for gaps of 2.4 m or more, laid round" in checked(path)
     path.write_text("[rover]\nturning_radius_m = 2\n[[target]]\nnorth_m = 30\neast_m = 0\n")
     assert "fields of 0.25 m (by the rover's size), for gaps of 1.2 m or more;" in checked(path)
 
