@@ -39,7 +39,7 @@ from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import ByteLink, LinkError, device_of, open_link
 from companion.mission.doubtful_places import doubtful_places
-from companion.mission.field_size import field_size, finer_evidence, sure_gap_m
+from companion.mission.field_size import field_size, finer_gap_m
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
@@ -169,8 +169,7 @@ def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Findi
         return []
     rover, mapping = mission.rover, settings.mapping
     sees = seen.vehicle.scan_ahead
-    narrow = sees is not None and sees.scan.is_narrow
-    size = field_size(rover, mapping, narrow_sight=narrow)
+    size = field_size(rover, mapping, narrow_sight=sees is not None and sees.scan.is_narrow)
     try:
         side_m = resolve(mission, LocalFrame(home.point), NedPoint(0.0, 0.0), size=size).ground.resolution_m
     except (MissionError, MapError) as error:
@@ -178,9 +177,9 @@ def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Findi
     doubtful = doubtful_places(mission, home.point)
     found = [Finding("far-target", Level.WARN, line, "look at the mission's places") for line in doubtful]
     if mission.grid.by_footprint:
-        gap_m = sure_gap_m(rover, finer_evidence(mapping, side_m), side_m)
-        wide = side_m <= 1.01 * size.fine_m and (narrow or rover.turning_radius_m > 0.0)
-        remedy = "arcs and single beams need such" if wide else "for narrower ones: resolution_m"
+        gap_m = finer_gap_m(rover, mapping, side_m)
+        finer = size.may_be_finer(side_m)
+        remedy = "for narrower ones: resolution_m" if finer else "smaller fields would open no more"
         says = f"The mission's fields are {side_m:.3g} m wide: the rover drives through gaps of {gap_m:.1f} m or more."
         found.append(Finding("fields", Level.NOTE, says, f"{remedy}, docs/missions.md"))
     return found

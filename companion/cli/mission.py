@@ -18,7 +18,7 @@ from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.do_commands import DoCommand
-from companion.mission.field_size import FieldSize, field_size, finer_evidence, sure_gap_m
+from companion.mission.field_size import FieldSize, field_size, finer_gap_m
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place, RoverSpec
@@ -194,7 +194,7 @@ def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
     side_m = resolved.ground.resolution_m
     gap_m = _gap_m(rover, side_m)
     size_of = f"fields of {side_m:.3g} m ({why}"
-    if side_m > size.fine_m:
+    if size.may_be_finer(side_m):
         of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
         smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"
         size_of += f", and no more than {size.most}; for narrower gaps give {smaller}"
@@ -204,7 +204,7 @@ def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
 
 
 def _gap_m(rover: RoverSpec, side_m: float) -> float:
-    return sure_gap_m(rover, finer_evidence(MappingSettings(), side_m), side_m)
+    return finer_gap_m(rover, MappingSettings(), side_m)
 
 
 def _maps(mission: Mission, world: SimulatedWorld | None) -> list[str]:

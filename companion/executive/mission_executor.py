@@ -52,7 +52,7 @@ from companion.mapping.evidence_map import EvidenceMap, forget, integrate, look_
 from companion.mapping.map_files import save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.do_commands import DoCommand
-from companion.mission.field_size import field_size, finer_evidence, sure_gap_m
+from companion.mission.field_size import field_size, finer_gap_m, sure_gap_m
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
@@ -553,8 +553,8 @@ class MissionExecutor:
         size = field_size(rover, evidence.settings, narrow_sight=self._scan.is_narrow)
         side_m = evidence.base.resolution_m
         gap_m = sure_gap_m(rover, evidence.settings, side_m)
-        if side_m > 1.01 * size.fine_m:
-            fine_m = sure_gap_m(rover, finer_evidence(evidence.settings, size.fine_m), size.fine_m)
+        if size.may_be_finer(side_m):
+            fine_m = finer_gap_m(rover, evidence.settings, size.fine_m)
             text = (
                 f"Map fields of {side_m:.3g} m may close gaps below {gap_m:.1f} m; smaller ones open more, "
                 f"of {size.fine_m:.2g} m down to {fine_m:.1f} m"

@@ -42,6 +42,10 @@ class FieldSize:
         """The side of a field on ground of this area."""
         return min(largest_m, max(self.fine_m, math.sqrt(area_m2 / self.most)))
 
+    def may_be_finer(self, side_m: float) -> bool:
+        """Whether smaller fields than those of this side would open more gaps."""
+        return side_m > 1.01 * self.fine_m
+
 
 def field_size(rover: RoverSpec, settings: MappingSettings, *, narrow_sight: bool = False) -> FieldSize:
     """The size by the rover, and by whether it sees with single thin beams alone.
@@ -71,6 +75,11 @@ def sure_gap_m(rover: RoverSpec, settings: MappingSettings, resolution_m: float)
     """A gap of this width is open on the map wherever it lies and however it is turned, to a tenth of a metre."""
     kept_m = map_radius_m(rover, settings) + settings.evidence_m
     return math.ceil(10.0 * (2.0 * kept_m + math.sqrt(2.0) * resolution_m) - 0.5) / 10.0
+
+
+def finer_gap_m(rover: RoverSpec, settings: MappingSettings, resolution_m: float) -> float:
+    """The same with the evidence that such fields get."""
+    return sure_gap_m(rover, finer_evidence(settings, resolution_m), resolution_m)
 
 
 def _in_steps(size_m: float) -> float:

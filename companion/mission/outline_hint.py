@@ -5,7 +5,7 @@ Nouns: outline hint.
 
 from __future__ import annotations
 
-from companion.mission.field_size import field_size, finer_evidence, sure_gap_m
+from companion.mission.field_size import field_size, finer_gap_m
 from companion.mission.mission import RoverSpec
 from companion.settings import MappingSettings
 from companion.settings.settings_file import FOR_PLANNED_MOTIONS
@@ -30,4 +30,4 @@ def outline_hint(rover: RoverSpec, controller: str = "points") -> str:
 
 def _gap_m(rover: RoverSpec, settings: MappingSettings) -> float:
     side_m = field_size(rover, settings).fine_m
-    return sure_gap_m(rover, finer_evidence(settings, side_m), side_m)
+    return finer_gap_m(rover, settings, side_m)
