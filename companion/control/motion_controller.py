@@ -26,8 +26,8 @@ from companion.control.motion_kernels import (
     Start,
     Weights,
     admitted_speeds,
-    may_be_last,
-    spare_m,
+    always_may_be_last,
+    braking_spares_m,
     way_of,
 )
 from companion.control.motion_planners import Found, MotionPlanner
@@ -48,7 +48,7 @@ WEIGHTS = Weights(
 )
 SHARES = (1.0, 0.7, 0.4, 0.15)
 """Of the speed that was planned, tried in turn until the rover may be left alone with it."""
-BRAKE_TURNS = (0.0, -0.5, 0.5, -1.0, 1.0)
+BRAKE_TURNS = np.array([0.0, -0.5, 0.5, -1.0, 1.0])
 """Turn rates to brake with, as shares of the fastest."""
 ENOUGH_M = 0.1
 """With so much room it does not turn while it brakes."""
@@ -206,8 +206,8 @@ class MotionController:
     def _braking(self, view: LocalView, worst: MotionProblem) -> ToldVelocity:
         """The way to brake that keeps most room, straight on where there is enough."""
         now_s, fastest_rad_s = self._time_s, worst.model.turn_fastest_rad_s
-        spare_m = {share: _least_spare_m(share * fastest_rad_s, view, worst) for share in BRAKE_TURNS}
-        best = max(BRAKE_TURNS, key=lambda share: min(spare_m[share], ENOUGH_M) - STRAIGHTER_M * (share != 0.0))
+        spares_m = _braking_spares_m(BRAKE_TURNS * fastest_rad_s, view, worst)
+        best = float(BRAKE_TURNS[np.argmax(np.minimum(spares_m, ENOUGH_M) - STRAIGHTER_M * (BRAKE_TURNS != 0.0))])
         rolls = abs(worst.start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
 
@@ -248,22 +248,22 @@ def _faster_s(view: LocalView) -> float:
     return max(FASTER_S, BLUR_S * min(view.rover.beam_rad, MOST_BLUR_RAD)) + DRIFT_SHARE * _alone_s(view)
 
 
-def _least_spare_m(turn_rad_s: float, view: LocalView, worst: MotionProblem) -> float:
-    """The room that is left where the rover brakes and turns as told, however much it turns."""
+def _braking_spares_m(turns_rad_s: NDArray[np.float64], view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
+    """The room that is left where the rover brakes and turns at each of these rates, however much it turns."""
     lasts_s = view.settings.guidance.velocity_lasts_s
-    gains = turn_gains(view.following, lasts_s)
-    spares_m = [spare_m(0.0, turn_rad_s, lasts_s, gain, 0.0, 0.0, worst, -math.inf, ENOUGH_M) for gain in gains]
-    return float(min(spares_m))
+    spares_m: NDArray[np.float64] = braking_spares_m(
+        turns_rad_s, lasts_s, turn_gains(view.following, lasts_s), ENOUGH_M, worst
+    )
+    return spares_m
 
 
 def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem) -> bool:
     """Whether this may be the last command, however the rover turns."""
-    lasts_s, margin_m, faster_s = view.settings.guidance.velocity_lasts_s, WEIGHTS.margin_m, _faster_s(view)
-
-    def may(gain: float) -> bool:
-        return bool(may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, margin_m, faster_s, worst))
-
-    return all(may(gain) for gain in turn_gains(view.following, lasts_s))
+    lasts_s = view.settings.guidance.velocity_lasts_s
+    gains = turn_gains(view.following, lasts_s)
+    return bool(
+        always_may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gains, WEIGHTS.margin_m, _faster_s(view), worst)
+    )
 
 
 def _latest(view: LocalView) -> int:

@@ -83,8 +83,9 @@ def look_round(
     log_odds = evidence.log_odds[low:high, left:right]
     cell_m, unseen = evidence.evidence_m, log_odds == 0.0
     closed, costly = _closed(evidence, (left, low), (right, high), body.radius_m)
-    # Fields that experience closed may lie under the rover: those do not keep it there.
-    costly &= ~_under(evidence, here, (left, low), costly.shape, body.around_m)
+    if costly.any():
+        # Fields that experience closed may lie under the rover: those do not keep it there.
+        costly &= ~_under(evidence, here, (left, low), costly.shape, body.around_m)
     blocked = (log_odds >= evidence.settings.occupied_at) | closed | costly
     _close_edge(blocked, (left, low), evidence)
     # To the surface: the map marks what lies a little behind it.
@@ -99,7 +100,7 @@ def look_round(
     seen_m = distance_field(outside) * np.float32(cell_m) - behind_m
     parts = [(row, column) for row in range(COARSE) for column in range(COARSE)]
     # The roomiest place of each counts: the mean would close gaps that are only just wide enough.
-    room_m = np.maximum.reduce([gap_m[row::COARSE, column::COARSE].astype(np.float64) for row, column in parts])
+    room_m = np.maximum.reduce([gap_m[row::COARSE, column::COARSE] for row, column in parts]).astype(np.float64)
     pace = _pace(room_m - body.radius_m, COARSE * cell_m, fastest_m_s)
     pace[np.logical_or.reduce([unseen[row::COARSE, column::COARSE] for row, column in parts])] *= UNSEEN_FACTOR
     cells = np.floor((evidence.frame.xys(ahead) - (left, low)) / COARSE).astype(np.int64)

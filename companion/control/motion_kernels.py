@@ -459,7 +459,7 @@ def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem):
         for side in range(2):
             most = model.fastest_m_s if side == 0 else -model.backwards_m_s
             share, step = 1.0, 1.0 / TRIED
-            while share > 0.5 * step and not _all_may(
+            while share > 0.5 * step and not always_may_be_last(
                 most * share * share, turns_rad_s[at], lasts_s, gains, margin_m, margin_s, problem
             ):
                 share -= step
@@ -469,19 +469,35 @@ def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem):
                 for _ in range(HALVED):
                     step *= 0.5
                     faster = share + step
-                    if _all_may(most * faster * faster, turns_rad_s[at], lasts_s, gains, margin_m, margin_s, problem):
+                    if always_may_be_last(
+                        most * faster * faster, turns_rad_s[at], lasts_s, gains, margin_m, margin_s, problem
+                    ):
                         share = faster
             admitted[at, side] = abs(most * share * share)
     return admitted
 
 
 @njit(cache=True, nogil=True)
-def _all_may(told_m_s, told_rad_s, lasts_s, gains, margin_m, margin_s, problem):
+def always_may_be_last(told_m_s, told_rad_s, lasts_s, gains, margin_m, margin_s, problem):
     """``may_be_last`` for each factor."""
     for gain in gains:  # noqa: SIM110 - numba has no ``all``
         if not may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
             return False
     return True
+
+
+@njit(cache=True, nogil=True)
+def braking_spares_m(turns_rad_s, lasts_s, gains, most_m, problem):
+    """``spare_m`` of a rover that is told to stand and to turn, for each turn rate; the least for any of the factors.
+
+    Above ``most_m`` it is not exact.
+    """
+    spares = np.full(turns_rad_s.size, FAR_M)
+    for at in range(turns_rad_s.size):
+        for gain in gains:
+            spare = spare_m(0.0, turns_rad_s[at], lasts_s, gain, 0.0, 0.0, problem, -math.inf, most_m)
+            spares[at] = min(spares[at], spare)
+    return spares
 
 
 @njit(cache=True, nogil=True)
@@ -517,6 +533,18 @@ def next_generation(motions, costs, best, chances, kicks, sizes, problem):
                     motions[one, knot, part] += sizes[part] * (0.2 + chance[3]) * kicks[one, knot, part]
         keep_within(motions[one], problem)
         costs[one] = cost_s(motions[one], problem)
+
+
+@njit(cache=True, nogil=True)
+def evolve(motions, best, chances, kicks, sizes, problem):
+    """One ``next_generation`` for each row of ``chances`` and ``kicks``, in place; gives the costs.
+
+    One call for all: to hand over a problem takes as long as to judge ten motions.
+    """
+    costs = costs_s(motions, problem)
+    for generation in range(chances.shape[0]):
+        next_generation(motions, costs, best, chances[generation], kicks[generation], sizes, problem)
+    return costs
 
 
 TRIED = 10

@@ -19,8 +19,8 @@ from companion.control.motion_kernels import (
     RoverModel,
     begin_later,
     costs_s,
+    evolve,
     keep_all_within,
-    next_generation,
 )
 from companion.core.own_parts import OwnKind, made_by
 
@@ -77,12 +77,9 @@ class MotionGa:
         keep_all_within(motions, problem)
         best = np.argsort(costs_s(seeds, problem))[: self.SEEDS]
         motions[np.argsort(self._costs)[-self.SEEDS :]] = seeds[best]
-        costs = costs_s(motions, problem)
         chances = rng.random((self.GENERATIONS, self.POPULATION, KNOTS + 4))
         kicks = rng.standard_normal((self.GENERATIONS, self.POPULATION, KNOTS, 2))
-        for chance, kick in zip(chances, kicks, strict=True):
-            next_generation(motions, costs, self.POPULATION // 4, chance, kick, self.SIZES, problem)
-        self._costs = costs
+        self._costs = costs = evolve(motions, self.POPULATION // 4, chances, kicks, self.SIZES, problem)
         found = int(np.argmin(costs))
         return Found(motions[found].copy(), float(costs[found]), motions.copy(), costs.copy())
 

@@ -21,16 +21,19 @@ def distance_field(marked):
     """Distances between middles of cells, in cells, shape as ``marked``; ``FAR`` where nothing is marked."""
     height, width = marked.shape
     squares = np.empty((height, width), np.float64)
-    # Along columns two sweeps do: each cell's distance to the nearest marked one of its column.
-    for x in range(width):
-        gap = FAR
-        for y in range(height):
-            gap = 0.0 if marked[y, x] else gap + 1.0
-            squares[y, x] = gap
-        gap = FAR
-        for y in range(height - 1, -1, -1):
-            gap = 0.0 if marked[y, x] else gap + 1.0
-            squares[y, x] = min(squares[y, x], gap) ** 2
+    # Along columns two sweeps do: each cell's distance to the nearest marked one of its column. Row by row, as the
+    # cells lie in memory.
+    gaps = np.full(width, FAR)
+    for y in range(height):
+        for x in range(width):
+            gaps[x] = 0.0 if marked[y, x] else gaps[x] + 1.0
+            squares[y, x] = gaps[x]
+    gaps[:] = FAR
+    for y in range(height - 1, -1, -1):
+        for x in range(width):
+            gaps[x] = 0.0 if marked[y, x] else gaps[x] + 1.0
+            nearest = min(squares[y, x], gaps[x])
+            squares[y, x] = nearest * nearest
     distances = np.empty((height, width), np.float32)
     tops = np.empty(width, np.int64)
     bounds = np.empty(width + 1, np.float64)

@@ -1,5 +1,6 @@
 // The facts of the panel: what each is called, what it says, and when it is a warning.
 
+import { isLost } from "viewer/freshness.js";
 import { distance, wayLeft } from "viewer/geometry.js";
 import { heading, lasting, metres, number, turning, UNKNOWN } from "viewer/words.js";
 
@@ -45,7 +46,7 @@ export function facts(frame) {
     ["Goal", goalOf(frame), null],
     ["Setpoint", setpointOf(frame), null],
     ["Heading", frame.pose ? `${heading(frame.pose[2])}, ${turning(frame.turn ?? 0)}` : UNKNOWN, null],
-    ["Link", linkOf(rates, figures), heartbeatLevel(rates.heartbeat_age_s)],
+    ["Link", linkOf(frame, rates, figures), linkLevel(frame, rates)],
     ["Position", rateOf(rates.position), rateLevel(rates.position)],
     ["Range sensor", rateOf(rates.range), rateLevel(rates.range)],
     ["GPS", gpsOf(frame.gps), gpsLevel(frame.gps)],
@@ -111,18 +112,20 @@ function setpointOf({ setpoint, pose }) {
   return setpoint.kind === "heading" ? `turn to ${heading(setpoint.heading)}` : setpoint.kind;
 }
 
-function linkOf(rates, figures) {
+function linkOf(frame, rates, figures) {
   const age = rates.heartbeat_age_s;
   if (age === undefined) return UNKNOWN;
   if (!Number.isFinite(age)) return "no heartbeat yet";
   if (age > OLD_HEARTBEAT_S) return `last heartbeat ${lasting(age)} ago`;
+  if (isLost(frame)) return "heartbeats, but no position";
   return Number.isFinite(figures.latency_ms) ? `good, ${number(figures.latency_ms, 0)} ms` : "good";
 }
 
-function heartbeatLevel(age) {
+function linkLevel(frame, { heartbeat_age_s: age }) {
   if (age === undefined) return null; // this source does not tell it
   if (!Number.isFinite(age)) return "warning";
-  return age > LOST_HEARTBEAT_S ? "error" : age > OLD_HEARTBEAT_S ? "warning" : null;
+  if (age > LOST_HEARTBEAT_S) return "error";
+  return age > OLD_HEARTBEAT_S || isLost(frame) ? "warning" : null;
 }
 
 function rateOf(rate) {

@@ -319,7 +319,9 @@ def test_it_turns_while_it_brakes_only_for_clearly_more_room(
     evidence = ground()
     wall(evidence, 4.0, 8.0, 12.0)
     monkeypatch.setattr(
-        motion_controller, "_least_spare_m", lambda turn_rad_s, *_: turned_m if turn_rad_s > 0.0 else -0.143
+        motion_controller,
+        "_braking_spares_m",
+        lambda turns_rad_s, *_: np.where(turns_rad_s > 0.0, turned_m, -0.143),
     )
     leads = controller()
     command = leads.follow(PATH, view(evidence, Pose(3.0, 10.0, 0.0, 0.0), 1.9))

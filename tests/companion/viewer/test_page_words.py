@@ -281,6 +281,20 @@ tell(moments.map((one) => readouts({ ...frame, ...one }).slice(0, 2).map((each) 
     assert (rolls[0], stands[0]) == ("last speed 0.4 m/s", "speed 0.0 m/s")
 
 
+def test_a_link_without_positions_is_not_called_good(tmp_path: Path) -> None:
+    script = """
+const { facts } = await import("./facts.js");
+const ages = [[0.4, 0.1], [0.4, 9], [4, 9], [9, 9], [Infinity, null]];
+tell(ages.map(([heartbeat_age_s, position_age_s]) => {
+  const frame = { state: "stopped", rates: { heartbeat_age_s, position_age_s }, figures: { latency_ms: 12 } };
+  return facts(frame).find(([name]) => name === "Link").slice(1);
+}));
+"""
+    good, lost, old, silent, none = ran(tmp_path, script)
+    assert good == ["good, 12 ms", None] and lost == ["heartbeats, but no position", "warning"]
+    assert old[1] == "warning" and silent[1] == "error" and none == ["no heartbeat yet", "warning"]
+
+
 def test_above_a_figure_stands_its_value_of_now_and_none_after_the_end(tmp_path: Path) -> None:
     script = """
 const { writeFileSync } = await import("node:fs");
