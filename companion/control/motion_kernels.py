@@ -539,7 +539,7 @@ def next_generation(motions, costs, best, chances, kicks, sizes, problem):
 def evolve(motions, best, chances, kicks, sizes, problem):
     """One ``next_generation`` for each row of ``chances`` and ``kicks``, in place; gives the costs.
 
-    One call for all: to hand over a problem takes as long as to judge ten motions.
+    One call for all: to hand over a problem takes as long as to judge some five motions.
     """
     costs = costs_s(motions, problem)
     for generation in range(chances.shape[0]):
