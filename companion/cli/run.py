@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-import signal
-import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import FrameType
 from typing import Annotated
 
 import typer
@@ -18,19 +14,21 @@ from rich.console import Console
 
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
+from companion.cli.ending import ended, print_statuses
+from companion.cli.entry import EXIT_STOPPED
 from companion.cli.given import RadiusM, ResolutionM, SpeedMS
 from companion.cli.inputs import EXIT_BAD_INPUT, Laps, OutputError, SkipUnknown, usable_settings
 from companion.cli.lidars import LidarOption, lidars_given
 from companion.cli.live import STDERR, Live, Reader, error_console, levelled, reader_of
 from companion.cli.live_view import LiveView, View, painter_for
+from companion.cli.rig import Rig
 from companion.cli.service import Service
-from companion.cli.source import Source, Stoppable, refuse_arming, warning
+from companion.cli.source import Source, refuse_arming, warning
 from companion.cli.state import RunState, StateFiles
+from companion.cli.stop_signals import StopSignals
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
-from companion.control.model_estimate import described
 from companion.core.clock import WallClock
 from companion.core.severity import Severity
-from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm, settle, warm_up
 from companion.lidar.reader import Lidars, lidars_on
 from companion.lidar.serial_port import open_ports
@@ -44,16 +42,12 @@ from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError
 from companion.mission.given import Given
 from companion.mission.mission import Mission, MissionError, with_laps
-from companion.mission.outline_hint import outline_hint
 from companion.navigation.step_runner import ThreadRunner
 from companion.recording.record_format import STATE, RecordError
 from companion.recording.recorder import NullRecorder, Recorder
-from companion.safety.reasons import PowerReason, Reason
 from companion.settings import Settings, SettingsError
 from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
-from companion.viewer.live_viewer import LiveViewer
 
-STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 BAD_INPUT = (
     SettingsError,
     MissionError,
@@ -68,9 +62,6 @@ BAD_INPUT = (
 )
 UNHURRIED_S = 10.0
 """A run that ends by itself waits this long for a slow disk, and for who reads its output."""
-AGAIN_S = 1.0
-"""So long after a signal the program must have ended, or the signal is raised again."""
-EXIT_REACHED, EXIT_MISSED, EXIT_STOPPED = 0, 3, 130
 
 
 def run(
@@ -128,7 +119,7 @@ def run(
         live.tell(text, Severity.WARNING) if live is not None else say(text)
 
     try:
-        with _StopSignals() as stop, contextlib.ExitStack() as ends:
+        with StopSignals() as stop, contextlib.ExitStack() as ends:
             budget = ShutdownBudget()
             files = StateFiles(state, budget)
             ends.callback(files.close)
@@ -154,7 +145,7 @@ def run(
             link, keeping = _opened(source, say, ends), RunState(mission, state, resume=resume, say=say)
             ends.callback(keeping.close)
             if keeping.ended:
-                raise typer.Exit(_print_statuses(keeping.statuses))
+                raise typer.Exit(print_statuses(keeping.statuses))
             given = {"settings": settings_file, STATE: keeping.file if keeping.previous else None}
             recorder = (
                 Recorder(
@@ -180,7 +171,7 @@ def run(
             autopilot = AutopilotLink(link, codec, settings.link, recorder, station)
             lines = Live(console, mission.name, reader)
             live = lines if painter is None else LiveView(painter, lines, mission.name)
-            rig = _Rig(
+            rig = Rig(
                 mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, budget, page, lidars
             )
             code = _drive(rig, seed=seed, arm=arm)
@@ -234,26 +225,7 @@ def _load_planner(settings: Settings, mission: Mission, say: Callable[[str], Non
     settle()
 
 
-@dataclass(frozen=True, slots=True)
-class _Rig:
-    """The objects of a run. ``place``: the folder of its record; None without one."""
-
-    mission: Mission
-    settings: Settings
-    link: ByteLink
-    autopilot: AutopilotLink
-    recorder: Recorder | NullRecorder
-    place: Path | None
-    keeping: RunState
-    files: StateFiles
-    live: Live | LiveView
-    stop: _StopSignals
-    budget: ShutdownBudget
-    page: LiveViewer | None
-    lidars: Lidars
-
-
-def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
+def _drive(rig: Rig, *, seed: int, arm: bool) -> int:
     """Drive to the end, close everything and print the result. Returns the exit code."""
     runner = ThreadRunner()
     companion = Companion(
@@ -306,109 +278,4 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
             rig.link.close()
             rig.lidars.close()
             rig.recorder.close()
-    return _ended(companion, rig)
-
-
-def _ended(companion: Companion, rig: _Rig) -> int:
-    """Print the result, and what could not be saved; returns the exit code."""
-    code = _print_statuses(companion.statuses(), companion.outcome.broken_off)
-    code = code if companion.complete else EXIT_MISSED
-    with contextlib.suppress(OSError):  # no reader: the exit code remains
-        if companion.parting is not None:
-            typer.echo(companion.parting, err=True)
-        for line in (*companion.command_lines(), *map(str, companion.laps)):
-            typer.echo(line)
-        if any(status is TargetStatus.UNREACHABLE for _, status in companion.statuses()):
-            hint = outline_hint(rig.mission.rover, rig.settings.guidance.controller)
-            typer.echo(hint, nl=bool(hint))
-        if companion.estimate is not None:
-            typer.echo(f"the rover follows velocities {described(companion.estimate)}")
-        for line in (rig.files.close(), rig.keeping.problem, str(rig.autopilot.codec.counters.refused)):
-            if line:
-                typer.echo(line, err=True)
-        if rig.place is not None:
-            _save_map(companion, rig.place, rig.budget)
-            if rig.recorder.problem:
-                typer.echo(rig.recorder.problem, err=True)
-            typer.echo(f"record: {rig.place}; rover-companion report {rig.place} shows it")
-        if rig.stop.asked and code != EXIT_REACHED and rig.keeping.way_on:
-            typer.echo(rig.keeping.way_on)
-    return code
-
-
-def _print_statuses(statuses: list[tuple[str, TargetStatus]], broken_off: Reason[PowerReason] | None = None) -> int:
-    """Print the status of each target, with the reason if the mission was broken off; returns the exit code."""
-    with contextlib.suppress(OSError):
-        for name, status in statuses:
-            untried = status in (TargetStatus.SKIPPED, TargetStatus.PENDING)
-            typer.echo(f"{name}: {status}{f' ({broken_off})' if broken_off is not None and untried else ''}")
-    return EXIT_REACHED if all(status is TargetStatus.REACHED for _, status in statuses) else EXIT_MISSED
-
-
-def _save_map(companion: Companion, directory: Path, budget: ShutdownBudget) -> None:
-    """Write the map as ``map.yaml`` and ``map.pgm``; a disk that is full or hangs does not change the run's result."""
-    place = directory / "map.yaml"
-    told: list[tuple[str, bool]] = []
-
-    def save() -> None:
-        try:
-            if companion.save_map(directory / "map"):
-                told.append((f"map: {place}", False))
-        except MapError as error:
-            told.append((str(error), True))
-
-    worker = BackgroundWorker("map", budget)
-    worker.put(save)
-    if not worker.close():
-        told.append((f"{place}: not written: the disk does not answer", True))
-    for line, err in told:
-        typer.echo(line, err=err)
-
-
-class _StopSignals:
-    """SIGINT, SIGTERM and a closed terminal stop the rover, then end the run.
-
-    Before the drive they end the program at once. An exception that is raised within a compiler's callback is lost, so
-    it is raised again until the program ends, and a drive does not begin.
-    """
-
-    def __init__(self) -> None:
-        self.asked = False
-        self._listener: Stoppable | None = None
-        self._again: threading.Timer | None = None
-
-    @property
-    def listener(self) -> Stoppable | None:
-        """Who is told; None before the drive."""
-        return self._listener
-
-    @listener.setter
-    def listener(self, listener: Stoppable | None) -> None:
-        if self.asked and self._listener is None:
-            raise SystemExit(EXIT_STOPPED)
-        self._listener = listener
-
-    def __enter__(self) -> _StopSignals:
-        """Install the handlers."""
-        self._before = {number: signal.signal(number, self._stop) for number in STOPPING}
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Restore the former handlers."""
-        if self._again is not None:
-            self._again.cancel()
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-    def _stop(self, number: int, frame: FrameType | None) -> None:
-        if self._listener is not None:
-            self.asked = True
-            self._listener.stop()
-            return
-        if not self.asked:
-            typer.echo("stopped before anything was sent to the rover", err=True)
-        self.asked = True
-        self._again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
-        self._again.daemon = True
-        self._again.start()
-        raise SystemExit(EXIT_STOPPED)
+    return ended(companion, rig)

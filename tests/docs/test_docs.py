@@ -20,7 +20,9 @@ from typer.testing import CliRunner
 
 import companion.cli.commands
 import sitl.cli.commands
-from companion.cli.run import EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED
+from companion.cli.ending import EXIT_MISSED
+from companion.cli.entry import EXIT_STOPPED
+from companion.cli.inputs import EXIT_BAD_INPUT
 from companion.cli.service import ALIVE_S
 from companion.mission.sensor_tables import BeamTable, LidarTable, ProximityTable, SensorsTable, SunTable
 from companion.settings import parse_settings

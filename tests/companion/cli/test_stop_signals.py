@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from companion.cli import run
-from companion.cli.run import _StopSignals
+from companion.cli import stop_signals
+from companion.cli.stop_signals import StopSignals
 
 
 class Told:
@@ -16,8 +16,8 @@ class Told:
 
 
 def test_what_a_callback_has_lost_is_raised_again_and_no_drive_begins(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "AGAIN_S", 0.05)
-    with _StopSignals() as stop:
+    monkeypatch.setattr(stop_signals, "AGAIN_S", 0.05)
+    with StopSignals() as stop:
         with contextlib.suppress(SystemExit):  # as a callback of the compiler does
             signal.raise_signal(signal.SIGINT)
         with pytest.raises(SystemExit) as lost:
@@ -29,9 +29,9 @@ def test_what_a_callback_has_lost_is_raised_again_and_no_drive_begins(monkeypatc
 
 
 def test_nothing_is_raised_after_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "AGAIN_S", 0.05)
+    monkeypatch.setattr(stop_signals, "AGAIN_S", 0.05)
     before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(SystemExit), _StopSignals():
+    with pytest.raises(SystemExit), StopSignals():
         signal.raise_signal(signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) is before
     time.sleep(0.15)
