@@ -51,7 +51,7 @@ An unknown key is refused, with a similar key that exists or with all keys of th
 out of range is refused too. `profile = "paper"` searches with the genetic algorithm alone (it sets `navigator.planner`
 to `bspline-ga`, unless the file says otherwise); the default profile has graph search behind it, see
 [planners.md](planners.md). A `guidance.controller` that plans motions changes a few defaults of `[mapping]` and
-`[link]`, see [guidance.md](guidance.md#planned-motions).
+`[link]`, see [planned motions](planned-motions.md).
 """
 
 

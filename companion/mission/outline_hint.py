@@ -24,7 +24,7 @@ def outline_hint(rover: RoverSpec, controller: str = "points") -> str:
         return ""
     return (
         f"the rover counts as the circle round its outline, for gaps of {round_m:.1f} m or more; with a lidar, "
-        f'guidance.controller = "motion-ga" in --settings drives through {long_m:.1f} m (docs/guidance.md)'
+        f'guidance.controller = "motion-ga" in --settings drives through {long_m:.1f} m (docs/planned-motions.md)'
     )
 
 

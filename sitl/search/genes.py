@@ -66,7 +66,7 @@ class Gene:
 
 
 ROVER = (Gene(SearchPart.ROVER, "off_model", 0.0, 0.3, 0.0), Gene(SearchPart.ROVER, "late_s", 0.0, 0.2, 0.0))
-"""As far off its model and as late as the rover must bear (docs/guidance.md)."""
+"""As far off its model and as late as the rover must bear (docs/planned-motions.md)."""
 SENSORS = (
     Gene(SearchPart.SENSORS, "noise_m", 0.0, 0.1, 0.02),
     Gene(SearchPart.SENSORS, "dropout", 0.0, 0.3, 0.0),
