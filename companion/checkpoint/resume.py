@@ -102,7 +102,7 @@ def resume_permission(state: SavedState, vehicle: VehicleState) -> ResumePermiss
         return ResumePermission(control, may_arm=unchanged and state.armed)
     if heartbeat.mode == RoverMode.HOLD and heartbeat.armed and not restarted and state.guarded:
         if vehicle.guard is None:
-            return None  # it speaks once a second
+            return None  # it speaks twice a second
         if vehicle.guard.acted:
             return ResumePermission(Control.NOBODY, may_arm=False)
     if heartbeat.mode != RoverMode.GUIDED and (heartbeat.armed or not restarted):

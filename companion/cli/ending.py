@@ -40,7 +40,8 @@ def ended(companion: Companion, rig: Rig) -> int:
             _save_map(companion, rig.place, rig.budget)
             if rig.recorder.problem:
                 typer.echo(rig.recorder.problem, err=True)
-            typer.echo(f"record: {rig.place}; rover-companion report {rig.place} shows it")
+            shows = "" if companion.vehicle.heartbeat is None else f"; rover-companion report {rig.place} shows it"
+            typer.echo(f"record: {rig.place}{shows}")
         if rig.stop.asked and code != EXIT_REACHED and rig.keeping.way_on:
             typer.echo(rig.keeping.way_on)
     return code

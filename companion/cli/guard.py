@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, replaced, usable_settings, writable
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, in_folder, replaced, usable_settings
 from companion.core.clock import WallClock
 from companion.mavlink.file_upload import FileUpload, UploadEnd
 from companion.mavlink.transport import LinkError, open_link
@@ -52,7 +52,7 @@ def guard(
 
 def _write(place: Path, text: str) -> None:
     place = place / FILE if place.is_dir() else place
-    writable(place)
+    in_folder(place)
     with replaced(place) as new:
         new.write_text(text, encoding="utf-8")
     typer.echo(f"wrote {place}; copy it to the folder APM/scripts of the autopilot's SD card; {WHAT_NEXT}")

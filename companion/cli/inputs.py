@@ -85,6 +85,15 @@ def writable(path: Path | None, suffix: str = "") -> None:
                 file.unlink()
 
 
+def in_folder(path: Path) -> None:
+    """Like ``writable``, for a file that goes elsewhere afterwards: its folder must be there already, else the name of
+    a mounted card may have a slip in it. Raises OutputError.
+    """
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: there is no folder {path.parent}; make it, or name another one")
+    writable(path)
+
+
 def apart(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
     """No output is a file that is read, or another output: nothing is lost. Raises OutputError."""
     used = {os.path.realpath(path) for path in inputs if path is not None}

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, replaced, usable_settings, writable
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, in_folder, replaced, usable_settings
 from companion.cli.state import StateFiles
 from companion.core.clock import WallClock
 from companion.mavlink.parameter_reader import ParameterReader
@@ -83,9 +83,7 @@ def _write(place: Path, wanted: Sequence[WantedParameter], table: Sequence[Wante
     form = SUFFIXES.get(place.suffix.lower())
     if form is None:
         raise OutputError(f"{place}: end its name in .param (Mission Planner, MAVProxy) or .params (QGroundControl)")
-    if not place.parent.is_dir():
-        raise OutputError(f"{place}: there is no folder {place.parent}; make it, or name another one")
-    writable(place)
+    in_folder(place)
     with replaced(place) as new:
         new.write_text(text_of(wanted, table, form), encoding="utf-8")
     typer.echo(f"wrote {place}: {len(wanted)} parameters; load it with a ground station, and restart the autopilot")

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-DISC_EXCESS = 1.03
-"""The discs that cover a rectangle reach this much farther aside than the rectangle, if a few of them can."""
-MOST_DISCS = 6
+DISC_EXCESS, DISC_EXCESS_M = 0.03, 0.01
+"""The discs that cover a rectangle reach so much farther aside than it: a share of its half width, and at most the
+second. Else a long or wide rover would not fit through gaps that its outline fits through."""
+MOST_DISCS = 24
+"""Discs take time: an outline more than six times as long as wide is covered by this many, which reach farther."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +53,9 @@ class Footprint:
         if self.is_circle:
             return np.zeros(1), self.front_m
         length_m, half_m = self.front_m + self.rear_m, self.half_width_m
-        few = math.ceil(length_m / (2.0 * half_m * math.sqrt(DISC_EXCESS**2 - 1.0)) - 1e-9)
-        count = min(max(few, 1), MOST_DISCS)
+        beyond_m = min(DISC_EXCESS * half_m, DISC_EXCESS_M)
+        needed = math.ceil(length_m / (2.0 * math.sqrt((half_m + beyond_m) ** 2 - half_m**2)) - 1e-9)
+        count = min(max(needed, 1), MOST_DISCS)
         piece_m = length_m / count
         ahead_m = -self.rear_m + piece_m * (np.arange(count) + 0.5)
         return ahead_m.astype(np.float64), math.hypot(half_m, 0.5 * piece_m)

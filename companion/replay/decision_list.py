@@ -92,7 +92,9 @@ def decision_at(record: Record, clock: RecordClock, text: str) -> int:
     last = len(record.decisions)
     if text.isascii() and text.isdigit() and len(text) < 10:
         if not 1 <= int(text) <= last:
-            raise RecordError(f"{record.directory}: there is no decision {int(text)}, the last one is {last}")
+            raise RecordError(
+                f"{record.directory}: there is no decision {int(text)}, the last one is {last}; seconds are {text}s"
+            )
         return int(text)
     since_s = clock.moment_s(text)
     if since_s is None:

@@ -19,7 +19,8 @@ from companion.viewer.wire import Place, tile_message, tiles_in
 BACK_S = 1.0
 """A clock that goes back by more than this is another run's."""
 TILES_AT_ONCE = 200
-TAKE_OVER = "take the rover over if it still moves; why may be in the program's terminal or journal"
+WHERE = "why may be in the program's terminal or journal"
+TAKE_OVER = f"take the rover over if it still moves; {WHERE}"
 RUN_KEYS = ("run", "map_epoch", "began_unix_s", "map")
 """Where one of these differs in a scene, a page forgets the map, and mostly everything that it has heard before."""
 
@@ -146,8 +147,13 @@ class LiveBoard:
     def end(self) -> None:
         """Nothing more comes of the run: where it has not said that it ended, its program is gone."""
         if self.frame is not None and self.frame["state"] != "ended":
-            line = f"ended, {EndReason.GONE.value}"
-            self.take({**self.frame, "news": [], "state": "ended", "line": line, "why": TAKE_OVER, "drives": "nobody"})
+            line, why = f"ended, {EndReason.GONE.value}", WHERE if self._is_simulated else TAKE_OVER
+            self.take({**self.frame, "news": [], "state": "ended", "line": line, "why": why, "drives": "nobody"})
+
+    @property
+    def _is_simulated(self) -> bool:
+        """Whether the rover is one with the program, and gone with it."""
+        return self.scene is not None and bool(self.scene.get("simulated"))
 
     def _take_frame(self, frame: Json) -> None:
         if frame["t"] < self.past.newest_s - BACK_S:  # a page forgets what was before, too

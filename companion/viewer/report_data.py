@@ -117,7 +117,7 @@ class ReportWatch(ReplayObserver):
     """Looks at a companion that is run again, and keeps frames, tiles and decisions."""
 
     def __init__(self, record: Record) -> None:
-        self.scene: Json = {}
+        self.scene: Json = {"mission": record.mission.name}
         self.frames: list[Json] = []
         self.tiles: list[tuple[float, str]] = []
         self.decisions: list[Json] = []

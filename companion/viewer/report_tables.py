@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from companion.replay.replay import ReplayResult
+from companion.viewer.frame import NOT_REACHED
 from companion.viewer.run_tally import RunTally, Spell
 
 NOT_KNOWN, NBSP = "-", "\N{NO-BREAK SPACE}"
@@ -85,7 +86,11 @@ def _compared(value: float | None, first: float | None, digits: int) -> str:
 def _targets(tally: RunTally) -> Json:
     """What became of each target, when, and how far the way was."""
     rows = [
-        [leg.name, leg.status, *(_number(value, 1) for value in (leg.reached_s, leg.driven_m, leg.straight_m))]
+        [
+            leg.name,
+            str(NOT_REACHED.get(leg.status, leg.status)),
+            *(_number(value, 1) for value in (leg.reached_s, leg.driven_m, leg.straight_m)),
+        ]
         for leg in tally.legs
     ]
     return {"title": "Targets", "head": ["target", "status", "at s", "driven m", "straight m"], "rows": rows}

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from companion.app import Companion
 from companion.core.frames import NedPoint
+from companion.executive.mission_progress import TargetStatus
 from companion.navigation.field_step import Decision
 from companion.replay.replay import ReplayObserver
 from companion.safety.reasons import Doubt, RunPhase, WaitReason
@@ -40,7 +41,7 @@ class Leg:
     """The way to one target. ``reached_s`` is None until then; ``straight_m``: from where the leg began."""
 
     name: str
-    status: str
+    status: TargetStatus
     reached_s: float | None = None
     driven_m: float | None = None
     straight_m: float | None = None
@@ -97,7 +98,7 @@ class RunTally(ReplayObserver):
     @property
     def reached(self) -> int:
         """Targets reached."""
-        return sum(leg.status == "reached" for leg in self.legs)
+        return sum(leg.status is TargetStatus.REACHED for leg in self.legs)
 
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """See ``ReplayObserver``."""
@@ -143,10 +144,10 @@ class RunTally(ReplayObserver):
             self._leg_from, self._leg_from_m = point, self.driven_m
         statuses = companion.statuses()
         if len(self.legs) != len(statuses):
-            self.legs = [Leg(name, str(status)) for name, status in statuses]
+            self.legs = [Leg(name, status) for name, status in statuses]
         for leg, (_, status) in zip(self.legs, statuses, strict=True):
-            leg.status = str(status)
-            if leg.status == "reached" and leg.reached_s is None:
+            leg.status = status
+            if leg.status is TargetStatus.REACHED and leg.reached_s is None:
                 leg.reached_s, leg.driven_m = time_s, self.driven_m - self._leg_from_m
                 if point is not None and self._leg_from is not None:
                     leg.straight_m = self._leg_from.distance_m(point)

@@ -9,6 +9,7 @@ from companion.app import Status
 from companion.core.clock import stopwatch_s
 from companion.executive.mission_progress import TargetStatus
 from companion.navigation.field_step import Part
+from companion.viewer.frame import doing_of
 from companion.viewer.headway import Headway
 from companion.viewer.terminal.known import headline_of, known_layers, mission_section, path_ahead, target_places
 from companion.viewer.terminal.painter import Painter
@@ -87,7 +88,9 @@ class DriveView:
         """Draw the last moment, with what the drive came to; that moment."""
         status = self._run.take_status()
         self._take_in(status)
-        self._show(self._view(status, stopwatch_s(), outcome_line(report)))
+        doing = doing_of(self._run.companion, status, self._headway)
+        waits = f"{doing['line']}, {doing['why']}" if doing["state"] in ("stopped", "waiting") else ""
+        self._show(self._view(status, stopwatch_s(), outcome_line(report, waits)))
         return status
 
     def _show(self, view: View) -> None:
@@ -113,11 +116,12 @@ class DriveView:
         return replace(sketch, layers=layers, places=tuple(places))
 
 
-def outcome_line(report: Report) -> Headline:
-    """What the drive came to."""
+def outcome_line(report: Report, waits: str = "") -> Headline:
+    """What the drive came to. ``waits``: why the rover stood at its end, and what for."""
     reached = sum(status is TargetStatus.REACHED for _, status in report.targets)
     text = (
         f"outcome: {report.outcome}, {reached} of {len(report.targets)} targets reached, {report.distance_m:.0f} m in "
         f"{report.driving_time_s:.0f} s, {report.collisions} collision{'s' * (report.collisions != 1)}"
+        f"{f'; {waits}' if waits else ''}"
     )
     return Headline(text, Mood.GOOD if report.outcome is DriveOutcome.REACHED else Mood.BAD)

@@ -85,9 +85,11 @@ def read_worlds(file: Path) -> list[BarnWorld]:
                 BarnWorld(int(number), np.asarray(lattice, dtype=np.bool_), _path_m(archive[f"path_{number}"]))
                 for number, lattice in zip(archive["number"], archive["lattice"], strict=True)
             ]
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+    except OSError as error:
+        raise ExperimentError(f"{file}: cannot be read ({error.strerror or error})") from error
+    except (ValueError, KeyError, EOFError, BadZipFile) as error:  # whose texts are of numpy's inner life
         raise ExperimentError(
-            f"{file}: no archive of BARN worlds ({error}); give a .npz as described in the docs"
+            f"{file}: no archive of BARN worlds; give a .npz with the arrays number, lattice and path_NUMBER"
         ) from error
     if not worlds:
         raise ExperimentError(f"{file}: has no world")

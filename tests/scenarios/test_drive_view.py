@@ -228,5 +228,6 @@ def test_the_outcome_stands_under_the_last_picture_and_the_newest_news_under_it(
     text = " ".join(" ".join(lines[frames[-1] + 1 if frames else 0 :]).split())
     before, outcome, news = text.partition("outcome: time limit, 0 of 1 targets reached")
     assert outcome, "also where there is no room for a picture"
+    assert columns < 80 or f"; stopped: {LatchReason.RESTARTED.value}" in news, "and why it came to no more"
     assert before == "" or not frames
     assert not frames or driven.views[-1].events[-1].rstrip(".") in news

@@ -106,3 +106,5 @@ def test_nobody_there_and_a_place_that_cannot_be_written_are_told_in_a_line(
     assert nobody.exit_code == 4 and "no rover was heard; check link and port" in nobody.output
     nowhere = CliRunner().invoke(app, ["guard", "--write", str(tmp_path / "file" / ".." / "..")])
     assert nowhere.exit_code == 2 and len(nowhere.output.strip().splitlines()) == 1
+    slip = CliRunner().invoke(app, ["guard", "--write", str(tmp_path / "no-card" / "x.lua")])
+    assert slip.exit_code == 2 and "there is no folder" in slip.output and list(tmp_path.iterdir()) == []

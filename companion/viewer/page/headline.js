@@ -37,8 +37,9 @@ export class Headline {
   show(scene, frame, trouble = "", open = false) {
     const state = trouble ? "offline" : SIGNS.has(frame?.state) ? frame.state : "connecting";
     setAttribute(this.node, "data-state", state);
-    setIcon(this.sign, state === "ended" && reached(frame) < frame.statuses?.length ? "error" : state);
-    const line = trouble || sentence(frame?.line) || (open ? "Waiting for the run to begin" : "Connecting");
+    setIcon(this.sign, state === "ended" && !isGood(frame) ? "error" : state);
+    const touched = state === "ended" ? touches(frame) : "";
+    const line = trouble || sentence(frame?.line) + touched || (open ? "Waiting for the run to begin" : "Connecting");
     setText(this.line, line);
     setAttribute(this.line, "data-long", line.length > LONG ? "" : null);
     setText(this.spoken, trouble ? trouble.replace(/ for \d.*/, "") : (frame?.line ?? ""));
@@ -67,6 +68,16 @@ function liveness(trouble, open) {
 
 function lastKnown(frame) {
   return frame?.line ? `Last known: ${frame.line}` : "";
+}
+
+function isGood(frame) {
+  return reached(frame) === (frame.statuses?.length ?? 0) && !(frame.contacts > 0);
+}
+
+// What only a simulator knows.
+function touches({ contacts }) {
+  if (!(contacts > 0)) return "";
+  return contacts === 1 ? ", touched something" : `, touched something ${contacts} times`;
 }
 
 function reached({ statuses = [] }) {

@@ -43,6 +43,7 @@ class LivePage {
     };
     listenKeys(canvas, this.camera, this.parts.keys);
     this.heard = performance.now();
+    this.wrong = ""; // why a token was refused, until somebody is asked for another one
     this.connect();
   }
 
@@ -58,22 +59,30 @@ class LivePage {
       denied: (text) => this.deny(text),
     });
     this.link.token = findToken();
+    window.addEventListener("hashchange", () => this.takeToken()); // an address with a token, opened in the same tab
     this.model.listeners.add(() => this.later());
     setInterval(() => this.refresh(), LOOK_MS);
     this.link.connect();
   }
 
+  takeToken() {
+    const token = findToken();
+    if (token === null || token === this.link.token) return;
+    this.parts.viewer.querySelector(".token-form")?.remove();
+    this.enter(token);
+  }
+
   deny(text) {
     forgetToken();
-    if (this.freeToSee && this.link.token) {
-      this.enter(null); // who may look on without a token goes on looking
-      this.askToAct(text);
+    if (this.link.token) {
+      this.wrong = text;
+      this.enter(null); // whoever may look on without a token goes on looking
       return;
     }
     this.denied = true;
     this.refresh();
-    // Who gave a wrong one may still be allowed to look on without any.
-    this.askToken(text, this.link.token ? () => this.enter(null) : null);
+    this.askToken(this.wrong || text, null);
+    this.wrong = "";
   }
 
   leave(why) {
@@ -98,7 +107,10 @@ class LivePage {
   take(message) {
     if (message.kind === "answer") this.actions.take(message);
     else this.model.take(message);
-    if (message.kind === "scene" && this.link.token === null) this.freeToSee = true;
+    if (message.kind === "scene" && this.wrong) {
+      this.askToAct(this.wrong);
+      this.wrong = "";
+    }
     if (message.kind === "frame") this.heard = performance.now();
   }
 

@@ -16,11 +16,19 @@ const DASHES = [
 const JUMP_M = 5;
 const FASTEST_M_S = 5;
 
+/** Takes the room of such marks, so that no name lies over one of them. */
+export function takeMarks(pen, places) {
+  for (const place of places) {
+    const [x, y] = pen.camera.toScreen(...place);
+    pen.taken.push([x - 9, y - 9, 18, 18]);
+  }
+}
+
 /** Where the rover touched something, as stars. */
 export function drawContacts(pen, places) {
   const { context, camera, colours } = pen;
-  for (const place of places) {
-    const [x, y] = camera.toScreen(...place);
+  const spots = places.map((place) => camera.toScreen(...place));
+  for (const [x, y] of spots) {
     context.beginPath();
     star(x, y, 12).forEach(([px, py]) => context.lineTo(px, py));
     context.closePath();
@@ -28,22 +36,22 @@ export function drawContacts(pen, places) {
     pen.stroke(colours.halo, 4);
     context.fillStyle = colours.failed;
     context.fill();
-    pen.label("contact", x, y, 14, { size: 12, colour: colours.failed });
   }
+  for (const [x, y] of spots) pen.label("contact", x, y, 14, { size: 12, colour: colours.failed });
 }
 
 /** Where the rover stopped, or was held up on its way, as the squares of the timeline. */
 export function drawStops(pen, events) {
   const { context, camera, colours } = pen;
-  for (const { place, name } of events) {
-    const [x, y] = camera.toScreen(...place);
+  const spots = events.map(({ place }) => camera.toScreen(...place));
+  for (const [x, y] of spots) {
     context.beginPath();
     context.rect(x - 6, y - 6, 12, 12);
     pen.stroke(colours.halo, 4);
     context.fillStyle = colours.ink;
     context.fill();
-    pen.label(name, x, y, 12, { size: 12, colour: colours.ink });
   }
+  events.forEach(({ name }, i) => pen.label(name, ...spots[i], 12, { size: 12, colour: colours.ink }));
 }
 
 /** The places of a track [t, north, east] as lines: where the position jumps, another one begins. */

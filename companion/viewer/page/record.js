@@ -26,13 +26,14 @@ export class Record {
     this.frames = filled(data.frames ?? []);
     this.times = this.frames.map((frame) => frame.t);
     this.news = this.frames.flatMap((frame) => (frame.news ?? []).map((one) => ({ ...one, t: one.t ?? frame.t })));
-    this.newsTimes = this.news.map((one) => one.t);
     this.decisions = data.decisions ?? [];
     this.decisionTimes = this.decisions.map((decision) => decision.t);
     this.contacts = data.contacts ?? [];
     this.tables = data.tables ?? [];
     this.others = data.others ?? [];
     this.events = eventsOf(this);
+    this.news = [...this.news, ...this.contacts.map(told)].sort((a, b) => a.t - b.t);
+    this.newsTimes = this.news.map((one) => one.t);
     this.maps = data.maps ?? [];
     this.mapTimes = this.maps.map(([t]) => t);
     this.readTiles(data.tiles ?? []);
@@ -124,6 +125,11 @@ function filled(frames) {
     before = { ...before, news: [], ...frame };
     return before;
   });
+}
+
+// A contact as one of the news.
+function told({ t, what }) {
+  return { t, level: "error", text: `Contact: ${what}` };
 }
 
 // Whether somebody else drives the rover.

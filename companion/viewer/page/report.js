@@ -9,7 +9,7 @@ import { isLost, silence } from "viewer/freshness.js";
 import { listen, listenKeys } from "viewer/gestures.js";
 import { MapView } from "viewer/map_view.js";
 import { Model } from "viewer/model.js";
-import { drawContacts, drawStops, Others } from "viewer/overlays.js";
+import { drawContacts, drawStops, Others, takeMarks } from "viewer/overlays.js";
 import { Panel } from "viewer/panel.js";
 import { Playback } from "viewer/playback.js";
 import { readRecord, Record } from "viewer/record.js";
@@ -84,15 +84,14 @@ class ReportPage {
       if (this.choosing) this.decisions.drawLines(pen); // no name of a target lies under them
     });
     this.view.above.push((pen) => {
+      const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t);
+      const stops = past(this.record.events.filter((event) => event.kind === "stop"));
+      const contacts = past(this.record.contacts).map((one) => one.place);
+      takeMarks(pen, [...stops.map((one) => one.place), ...contacts]);
       if (this.choosing) this.decisions.drawCosts(pen);
       else this.others.drawPlaces(pen, this.playback.t);
-      const { contacts, events } = this.record;
-      const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t);
-      drawStops(pen, past(events.filter((event) => event.kind === "stop")));
-      drawContacts(
-        pen,
-        past(contacts).map((one) => one.place),
-      );
+      drawContacts(pen, contacts);
+      drawStops(pen, stops);
     });
     this.decisions.changed = () => this.view.invalidate();
   }

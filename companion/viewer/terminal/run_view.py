@@ -133,7 +133,7 @@ class RunView:
             Fact("heartbeat", age, alarm=age_s is None or age_s > HEARTBEAT_OLD_S),
             Fact("positions", f"{rates['position']:.0f} a second"),
             Fact("ranges", f"{rates['range']:.0f} a second"),
-            Fact("latency", f"{1e3 * self._companion.vehicle.latency_s:.0f} ms", minor=True),
+            Fact("latency", "-" if age_s is None else f"{1e3 * self._companion.vehicle.latency_s:.0f} ms", minor=True),
         ]
         return Section("Link", tuple(facts))
 

@@ -68,6 +68,15 @@ def test_a_run_that_never_said_that_it_ended_is_told_as_gone(state: str) -> None
     board().end()  # nothing was told yet
 
 
+@pytest.mark.parametrize("simulated", [False, True])
+def test_only_a_real_rover_may_still_move_when_its_program_is_gone(simulated: bool) -> None:
+    live = board()
+    live.take({**SCENE, "simulated": simulated})
+    live.take(frame(1.0, "news"))
+    live.end()
+    assert live.frame is not None and ("take the rover over" in live.frame["why"]) is not simulated
+
+
 def test_a_slow_browser_misses_frames_but_no_news_and_no_tile() -> None:
     live = board()
     spectator = live.join(False, lambda: None)

@@ -375,6 +375,29 @@ tell(moments.map(show));
     ]
 
 
+def test_a_drive_that_touched_something_says_so_in_its_large_line_and_its_news(tmp_path: Path) -> None:
+    script = """
+globalThis.matchMedia = () => ({ matches: false, addEventListener() {} });
+const { Headline } = await import("./headline.js");
+const { Record } = await import("./record.js");
+const headline = new Headline();
+const moments = [0, 1, 3, null].map((contacts) => ({ contacts }));
+moments.push({ contacts: 3, state: "driving" });
+const lines = moments.map((one) => {
+  headline.show({ live: false }, { state: "ended", t: 1, line: "done", statuses: ["reached"], ...one });
+  return headline.line.textContent;
+});
+const later = { t: 2, level: "info", text: "later" };
+const frames = [0, 1, 2].map((t) => ({ t, state: "driving", news: t === 2 ? [later] : [] }));
+const record = new Record({ scene: {}, frames, contacts: [{ t: 1, what: "an obstacle", place: [0, 0] }] });
+tell([lines, record.news.map((one) => [one.t, one.level, one.text]), record.events.map((one) => one.kind)]);
+"""
+    lines, news, kinds = ran(tmp_path, DOCUMENT + script)
+    touched = ["Done", "Done, touched something", "Done, touched something 3 times"]
+    assert lines == [*touched, "Done", "Done"]
+    assert news == [[1, "error", "Contact: an obstacle"], [2, "info", "later"]] and kinds == ["contact"]
+
+
 def test_decisions_with_which_the_rover_just_goes_on_can_be_left_out(tmp_path: Path) -> None:
     script = """
 const { Decisions } = await import("./decisions.js");
