@@ -16,18 +16,27 @@ const DASHES = [
 const JUMP_M = 5;
 const FASTEST_M_S = 5;
 
-/** Takes the room of such marks, so that no name lies over one of them. */
-export function takeMarks(pen, places) {
-  for (const place of places) {
-    const [x, y] = pen.camera.toScreen(...place);
-    pen.taken.push([x - 9, y - 9, 18, 18]);
-  }
-}
-
 /** Where the rover touched something, as stars. */
 export function drawContacts(pen, places) {
-  const { context, camera, colours } = pen;
-  const spots = places.map((place) => camera.toScreen(...place));
+  const spots = places.map((place) => pen.camera.toScreen(...place));
+  drawStars(pen, spots);
+  nameContacts(pen, spots);
+}
+
+/** Where the rover stopped, or was held up on its way, as the squares of the timeline; and contacts, over them. */
+export function drawHappenings(pen, events, contacts) {
+  const [stops, stars] = [events.map((one) => one.place), contacts].map((places) =>
+    places.map((place) => pen.camera.toScreen(...place)),
+  );
+  for (const [x, y] of [...stops, ...stars]) pen.taken.push([x - 9, y - 9, 18, 18]); // no name lies over a mark
+  drawSquares(pen, stops);
+  drawStars(pen, stars);
+  nameContacts(pen, stars);
+  events.forEach(({ name }, i) => pen.label(name, ...stops[i], 12, { size: 12, colour: pen.colours.ink }));
+}
+
+function drawStars(pen, spots) {
+  const { context, colours } = pen;
   for (const [x, y] of spots) {
     context.beginPath();
     star(x, y, 12).forEach(([px, py]) => context.lineTo(px, py));
@@ -37,13 +46,14 @@ export function drawContacts(pen, places) {
     context.fillStyle = colours.failed;
     context.fill();
   }
-  for (const [x, y] of spots) pen.label("contact", x, y, 14, { size: 12, colour: colours.failed });
 }
 
-/** Where the rover stopped, or was held up on its way, as the squares of the timeline. */
-export function drawStops(pen, events) {
-  const { context, camera, colours } = pen;
-  const spots = events.map(({ place }) => camera.toScreen(...place));
+function nameContacts(pen, spots) {
+  for (const [x, y] of spots) pen.label("contact", x, y, 14, { size: 12, colour: pen.colours.failed });
+}
+
+function drawSquares(pen, spots) {
+  const { context, colours } = pen;
   for (const [x, y] of spots) {
     context.beginPath();
     context.rect(x - 6, y - 6, 12, 12);
@@ -51,7 +61,6 @@ export function drawStops(pen, events) {
     context.fillStyle = colours.ink;
     context.fill();
   }
-  events.forEach(({ name }, i) => pen.label(name, ...spots[i], 12, { size: 12, colour: colours.ink }));
 }
 
 /** The places of a track [t, north, east] as lines: where the position jumps, another one begins. */

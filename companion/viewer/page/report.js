@@ -9,7 +9,7 @@ import { isLost, silence } from "viewer/freshness.js";
 import { listen, listenKeys } from "viewer/gestures.js";
 import { MapView } from "viewer/map_view.js";
 import { Model } from "viewer/model.js";
-import { drawContacts, drawStops, Others, takeMarks } from "viewer/overlays.js";
+import { drawHappenings, Others } from "viewer/overlays.js";
 import { Panel } from "viewer/panel.js";
 import { Playback } from "viewer/playback.js";
 import { readRecord, Record } from "viewer/record.js";
@@ -87,11 +87,9 @@ class ReportPage {
       const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t);
       const stops = past(this.record.events.filter((event) => event.kind === "stop"));
       const contacts = past(this.record.contacts).map((one) => one.place);
-      takeMarks(pen, [...stops.map((one) => one.place), ...contacts]);
+      drawHappenings(pen, stops, contacts);
       if (this.choosing) this.decisions.drawCosts(pen);
       else this.others.drawPlaces(pen, this.playback.t);
-      drawContacts(pen, contacts);
-      drawStops(pen, stops);
     });
     this.decisions.changed = () => this.view.invalidate();
   }
