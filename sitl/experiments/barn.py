@@ -200,8 +200,8 @@ class BarnReport(ExperimentReport):
 
     @property
     def section_name(self) -> str:
-        """See ``ExperimentReport``; other setups than the usual one stand beside it."""
-        return super().section_name + "".join(f"-{setup}" for setup in self._others())
+        """See ``ExperimentReport``; what differs from the usual table stands beside it."""
+        return super().section_name + "".join(f"-{one.replace(' ', '-')}" for one in self._differs())
 
     def tables(self) -> list[Table]:
         """One a setup, with a row a controller."""
@@ -220,9 +220,17 @@ class BarnReport(ExperimentReport):
     def _setups(self) -> list[Setup]:
         return [setup for setup in Setup if any(setup is one for one, _ in self.series)]
 
-    def _others(self) -> list[Setup]:
-        """The setups, where the usual one is not among them."""
-        return [] if Setup.GUARDED in self._setups() else self._setups()
+    def _differs(self) -> list[str]:
+        """What differs from the usual: setups, where it is not among them, or one controller alone; off and late."""
+        told: list[str] = [] if Setup.GUARDED in self._setups() else list(self._setups())
+        controllers = list(dict.fromkeys(name for _, name in self.series))
+        if not told and len(controllers) == 1:
+            told = controllers
+        if self.options.off != OFF_MODEL:
+            told.append(f"off {self.options.off:g}")
+        if self.options.late_s:
+            told.append(f"late {self.options.late_s:g}")
+        return told
 
     def _rows(self, setup: Setup, *, plain: bool = False) -> list[list[str]]:
         """``plain``: without intervals."""
@@ -242,8 +250,8 @@ class BarnReport(ExperimentReport):
         """See ``ExperimentReport``."""
         kind = f"The worlds of `{self.options.archive.name}`" if self.options.archive else "Worlds of our own making"
         tables = "\n\n".join(f"{_told(one)}:\n\n{markdown_table(HEAD, self._rows(one))}" for one in self._setups())
-        others = " and ".join(self._others())
-        return f"""## Narrow ground (BARN){others and f": {others}"}
+        differs = " and ".join(self._differs())
+        return f"""## Narrow ground (BARN){differs and f": {differs}"}
 
 `{self.options.command(NAME)}`
 

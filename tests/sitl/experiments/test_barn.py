@@ -88,13 +88,16 @@ def test_planned_motions_lead_through_narrow_ground() -> None:
     one = drive(world, "motion-ga", 0)
     assert one.end is RunEnd.REACHED and one.seconds < 2.0 * world.optimal_s
     assert one.track_m[0] == pytest.approx(START_M)
-    report = BarnReport(Options(1), (world,), {(Setup.GUARDED, "motion-ga"): (one,)})
+    both = {(Setup.GUARDED, name): (one,) for name in ("motion-ga", "dwa")}
+    report = BarnReport(Options(1), (world,), both)
     assert "not an entry" in report.section() and "motion-ga" in report.section()
     assert report.section_name == "barn" and report.pictures()["barn-worst"].axes  # type: ignore[attr-defined]
-    assert len(report.as_json()["runs"]) == 1  # type: ignore[arg-type]
+    assert len(report.as_json()["runs"]) == 2  # type: ignore[arg-type]
 
     other = BarnReport(Options(1), (world,), {(Setup.STRICT, "motion-ga"): (one,)})
     assert other.section_name == "barn-strict" and "(BARN): strict" in other.section()
+    alone = BarnReport(Options(1, off=0.5), (world,), {(Setup.GUARDED, "motion-ga"): (one,)})
+    assert alone.section_name == "barn-motion-ga-off-0.5" and "(BARN): motion-ga and off 0.5" in alone.section()
     assert list(other.pictures()) == ["barn-strict-worst"] and "images/barn-strict-worst.png" in other.section()
 
 
