@@ -200,8 +200,8 @@ class BarnReport(ExperimentReport):
 
     @property
     def section_name(self) -> str:
-        """See ``ExperimentReport``; what differs from the usual table stands beside it."""
-        return super().section_name + "".join(f"-{one.replace(' ', '-')}" for one in self._differs())
+        """See ``ExperimentReport``; other setups than the usual one, or one controller alone, stand beside it."""
+        return super().section_name + "".join(f"-{one}" for one in self._others())
 
     def tables(self) -> list[Table]:
         """One a setup, with a row a controller."""
@@ -220,17 +220,12 @@ class BarnReport(ExperimentReport):
     def _setups(self) -> list[Setup]:
         return [setup for setup in Setup if any(setup is one for one, _ in self.series)]
 
-    def _differs(self) -> list[str]:
-        """What differs from the usual: setups, where it is not among them, or one controller alone; off and late."""
-        told: list[str] = [] if Setup.GUARDED in self._setups() else list(self._setups())
-        controllers = list(dict.fromkeys(name for _, name in self.series))
-        if not told and len(controllers) == 1:
-            told = controllers
-        if self.options.off != OFF_MODEL:
-            told.append(f"off {self.options.off:g}")
-        if self.options.late_s:
-            told.append(f"late {self.options.late_s:g}")
-        return told
+    def _others(self) -> list[str]:
+        """The setups, where the usual one is not among them; the controller, where it is the only one."""
+        if Setup.GUARDED not in self._setups():
+            return [str(setup) for setup in self._setups()]
+        names = list(dict.fromkeys(name for _, name in self.series))
+        return names if len(names) == 1 else []
 
     def _rows(self, setup: Setup, *, plain: bool = False) -> list[list[str]]:
         """``plain``: without intervals."""
@@ -250,8 +245,8 @@ class BarnReport(ExperimentReport):
         """See ``ExperimentReport``."""
         kind = f"The worlds of `{self.options.archive.name}`" if self.options.archive else "Worlds of our own making"
         tables = "\n\n".join(f"{_told(one)}:\n\n{markdown_table(HEAD, self._rows(one))}" for one in self._setups())
-        differs = " and ".join(self._differs())
-        return f"""## Narrow ground (BARN){differs and f": {differs}"}
+        others = " and ".join(self._others())
+        return f"""## Narrow ground (BARN){others and f": {others}"}
 
 `{self.options.command(NAME)}`
 

@@ -96,8 +96,8 @@ def test_planned_motions_lead_through_narrow_ground() -> None:
 
     other = BarnReport(Options(1), (world,), {(Setup.STRICT, "motion-ga"): (one,)})
     assert other.section_name == "barn-strict" and "(BARN): strict" in other.section()
-    alone = BarnReport(Options(1, off=0.5), (world,), {(Setup.GUARDED, "motion-ga"): (one,)})
-    assert alone.section_name == "barn-motion-ga-off-0.5" and "(BARN): motion-ga and off 0.5" in alone.section()
+    alone = BarnReport(Options(1), (world,), {(Setup.GUARDED, "motion-ga"): (one,)})
+    assert alone.section_name == "barn-motion-ga" and "(BARN): motion-ga" in alone.section()
     assert list(other.pictures()) == ["barn-strict-worst"] and "images/barn-strict-worst.png" in other.section()
 
 
