@@ -39,20 +39,29 @@ def distance_field(marked):
     bounds = np.empty(width + 1, np.float64)
     for y in range(height):
         row = squares[y]
-        last = 0
-        tops[0], bounds[0], bounds[1] = 0, -np.inf, np.inf
-        for x in range(1, width):
-            at = _crossing(row, tops[last], x)
-            while at <= bounds[last]:
-                last -= 1
+        last = -1
+        for x in range(width):
+            if row[x] >= FAR * FAR:
+                continue  # nothing is marked in this column
+            at = -np.inf
+            while last >= 0:
                 at = _crossing(row, tops[last], x)
+                if at > bounds[last]:
+                    break
+                last -= 1
+                at = -np.inf
             last += 1
             tops[last], bounds[last], bounds[last + 1] = x, at, np.inf
-        piece = 0
-        for x in range(width):
-            while bounds[piece + 1] < x:
-                piece += 1
-            distances[y, x] = min(math.sqrt((x - tops[piece]) ** 2 + row[tops[piece]]), FAR)
+        if last < 0:
+            distances[y] = FAR
+            continue
+        first = 0
+        for piece in range(last + 1):
+            end = min(int(math.floor(min(bounds[piece + 1], width))) + 1, width)
+            top, square = float(tops[piece]), row[tops[piece]]
+            for x in range(first, end):
+                distances[y, x] = min(math.sqrt((x - top) * (x - top) + square), FAR)
+            first = max(first, end)
     return distances
 
 
