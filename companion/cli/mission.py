@@ -12,10 +12,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from companion.cli.given import RadiusM, ResolutionM, SpeedMS
-from companion.cli.inputs import EXIT_BAD_INPUT, SkipUnknown
+from companion.cli.inputs import EXIT_BAD_INPUT, SkipUnknown, usable_settings
 from companion.cli.source import warn_of_places, warning
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
+from companion.executive.controller_choice import controller_in_force
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.do_commands import DoCommand
 from companion.mission.field_size import FieldSize, field_size, finer_gap_m
@@ -26,7 +27,8 @@ from companion.mission.outline_hint import outline_hint
 from companion.mission.resolve import ResolvedMission, resolve
 from companion.mission.sensor_tables import BEAMS
 from companion.mission.simulated_world import SimulatedWorld, check_start, doubtful_targets, world_of
-from companion.settings import MappingSettings
+from companion.settings import Settings, SettingsError
+from companion.settings.settings_file import by_points
 
 app = typer.Typer(name="mission", add_completion=False)
 
@@ -43,9 +45,13 @@ def check(
     radius_m: RadiusM = None,
     speed_m_s: SpeedMS = None,
     skip_unknown: SkipUnknown = False,
+    settings_file: Annotated[
+        Path | None, typer.Option("--settings", help="TOML file that the mission is to be driven with.")
+    ] = None,
 ) -> None:
     """Print what was understood of FILE. Exit code 0, or 2 with one line of reason."""
     try:
+        settings = usable_settings(settings_file)
         mission = load_mission(mission_file, skip_unknown=skip_unknown)
         mission = with_given(mission, Given(resolution_m, radius_m, speed_m_s))
         world = world_of(mission)
@@ -53,11 +59,12 @@ def check(
         if world is not None:
             check_start(mission, world)
         _check_start_known(mission)
-        resolved = _try_resolve(mission)
-    except (MissionError, MapError) as error:
+        settings = _in_force(settings, mission)
+        resolved = _try_resolve(mission, settings)
+    except (MissionError, MapError, SettingsError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    show(mission, maps, Console(highlight=False), resolved)
+    show(mission, settings, maps, Console(highlight=False), resolved)
     warn_of_places(mission, lambda line: typer.echo(warning(line)))
     for line in _doubtful_in(world, mission, resolved):
         typer.echo(warning(line))
@@ -65,8 +72,17 @@ def check(
 
 def warn_of_world(mission: Mission, warn: Callable[[str], None]) -> None:
     """Say which targets lie outside the simulator's world, or in its walls. Raises MissionError and MapError."""
-    for line in _doubtful_in(world_of(mission), mission, _try_resolve(mission)):
+    settings = _in_force(Settings(), mission)
+    for line in _doubtful_in(world_of(mission), mission, _try_resolve(mission, settings)):
         warn(line)
+
+
+def _in_force(settings: Settings, mission: Mission) -> Settings:
+    """Those of the controller that really leads the rover."""
+    rover, chosen = mission.rover, settings.guidance.controller
+    narrow = _has_beams(mission)
+    kind = controller_in_force(chosen, narrow_sight=narrow, turning_radius_m=rover.turning_radius_m)
+    return settings if kind == chosen else by_points(settings)
 
 
 def _doubtful_in(world: SimulatedWorld | None, mission: Mission, resolved: ResolvedMission | None) -> list[str]:
@@ -81,14 +97,14 @@ def _check_start_known(mission: Mission) -> None:
         raise MissionError(f"{mission.source or mission.name}: sitl.start: {says}")
 
 
-def _try_resolve(mission: Mission) -> ResolvedMission | None:
+def _try_resolve(mission: Mission, settings: Settings) -> ResolvedMission | None:
     """The mission as at the start of a run, if the file alone says where home is.
 
     This finds targets inside a fence, and a grid that is too large. A rover's home may differ from the planned home, so
     a mission in degrees is resolved only where the file has one, and then only a grid that is too large is refused.
     Raises MissionError.
     """
-    degrees, size = any(isinstance(place, GeoPoint) for place in _all_places(mission)), _size_of(mission)
+    degrees, size = any(isinstance(place, GeoPoint) for place in _all_places(mission)), _size_of(mission, settings)
     if not degrees:
         return resolve(mission, LocalFrame(GeoPoint(0.0, 0.0)), NedPoint(0.0, 0.0), size=size)
     if mission.planned_home is None:
@@ -101,9 +117,9 @@ def _try_resolve(mission: Mission) -> ResolvedMission | None:
         return None
 
 
-def _size_of(mission: Mission) -> FieldSize:
+def _size_of(mission: Mission, settings: Settings) -> FieldSize:
     """By the rover, and by whether the mission is to be simulated with single beams alone."""
-    return field_size(mission.rover, MappingSettings(), narrow_sight=_has_beams(mission))
+    return field_size(mission.rover, settings.mapping, narrow_sight=_has_beams(mission))
 
 
 def _has_beams(mission: Mission) -> bool:
@@ -115,14 +131,16 @@ def _all_places(mission: Mission) -> list[Place]:
     return [*(target.place for target in mission.targets), *(place for area in areas for place in area.places)]
 
 
-def show(mission: Mission, maps: list[str], console: Console, resolved: ResolvedMission | None = None) -> None:
+def show(
+    mission: Mission, settings: Settings, maps: list[str], console: Console, resolved: ResolvedMission | None = None
+) -> None:
     """Print the mission. ``resolved``: where it lies, if that is known."""
     console.print(f"[bold]{escape(mission.name)}[/bold]", soft_wrap=True)
     console.print(_targets(mission))
     for line in (
         *_commands(mission),
-        *_ground(mission, resolved),
-        *_vehicle(mission),
+        *_ground(mission, settings, resolved),
+        *_vehicle(mission, settings),
         *maps,
         *(f"note: {note}" for note in mission.notes),
     ):
@@ -165,9 +183,10 @@ def command_text(command: DoCommand) -> str:
     return " ".join([*parts, "once" if not command.repeatable else ""]).strip()
 
 
-def _ground(mission: Mission, resolved: ResolvedMission | None) -> list[str]:
+def _ground(mission: Mission, settings: Settings, resolved: ResolvedMission | None) -> list[str]:
     grid = mission.grid
-    size = _fields_by_rover(mission, resolved) if grid.by_footprint else _fields(mission)
+    by_rover = grid.by_footprint
+    size = _fields_by_rover(mission, settings, resolved) if by_rover else _fields(mission, settings)
     if grid.size is not None and grid.home is not None:
         lines = [f"grid: {grid.size[0]} x {grid.size[1]} {size}, home is the middle of {place_text(grid.home)}"]
     else:
@@ -179,32 +198,32 @@ def _ground(mission: Mission, resolved: ResolvedMission | None) -> list[str]:
     return lines
 
 
-def _fields(mission: Mission) -> str:
+def _fields(mission: Mission, settings: Settings) -> str:
     """How large fields are, and what narrow ground that leaves open."""
     side_m = mission.grid.resolution_m
-    return f"fields of {side_m:g} m, for gaps of {_gap_m(mission.rover, side_m):.1f} m or more"
+    return f"fields of {side_m:g} m, for gaps of {_gap_m(mission.rover, settings, side_m):.1f} m or more"
 
 
-def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
+def _fields_by_rover(mission: Mission, settings: Settings, resolved: ResolvedMission | None) -> str:
     """The same where the file does not say how large they are."""
-    rover, size = mission.rover, _size_of(mission)
+    rover, size = mission.rover, _size_of(mission, settings)
     why = "as single beams need" if _has_beams(mission) else "by the rover's size"
     if resolved is None:
         return f"fields of {size.fine_m:g} m ({why}; larger on ground with more than {size.most})"
     side_m = resolved.ground.resolution_m
-    gap_m = _gap_m(rover, side_m)
+    gap_m = _gap_m(rover, settings, side_m)
     size_of = f"fields of {side_m:.3g} m ({why}"
     if size.may_be_finer(side_m):
         of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
         smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"
         size_of += f", and no more than {size.most}; for narrower gaps give {smaller}"
-    beams_m = field_size(rover, MappingSettings(), narrow_sight=True).fine_m
-    beams = f"; with single beams alone of {beams_m:g} m, for {_gap_m(rover, beams_m):.1f} m"
+    beams_m = field_size(rover, settings.mapping, narrow_sight=True).fine_m
+    beams = f"; with single beams alone of {beams_m:g} m, for {_gap_m(rover, by_points(settings), beams_m):.1f} m"
     return f"{size_of}), for gaps of {gap_m:.1f} m or more{beams if beams_m > side_m else ''}"
 
 
-def _gap_m(rover: RoverSpec, side_m: float) -> float:
-    return finer_gap_m(rover, MappingSettings(), side_m)
+def _gap_m(rover: RoverSpec, settings: Settings, side_m: float) -> float:
+    return finer_gap_m(rover, settings.mapping, side_m)
 
 
 def _maps(mission: Mission, world: SimulatedWorld | None) -> list[str]:
@@ -224,13 +243,13 @@ def _map_text(grid: Grid) -> str:
     return f"{grid.width} x {grid.height} fields of {grid.resolution_m:g} m, {obstacles} of them obstacles"
 
 
-def _vehicle(mission: Mission) -> list[str]:
+def _vehicle(mission: Mission, settings: Settings) -> list[str]:
     rover = mission.rover
     turns = (
         f"in arcs of {rover.turning_radius_m:g} m radius or wider" if rover.turning_radius_m > 0.0 else "on the spot"
     )
     lines = [f"rover: radius {rover.radius_m:g} m, cruises at {rover.cruise_speed_m_s:g} m/s, turns {turns}"]
-    if hint := outline_hint(rover):
+    if hint := outline_hint(rover, settings.guidance.controller):
         lines.append(f"note: {hint}")
     if mission.planned_home is not None:
         lines.append(f"planned home: {place_text(mission.planned_home)}; the rover's own home is what counts")

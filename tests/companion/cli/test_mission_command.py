@@ -154,6 +154,19 @@ def test_it_says_how_large_fields_become_and_which_gaps_that_opens(tmp_path: Pat
     assert "fields of 0.25 m (by the rover's size), for gaps of 1.2 m or more;" in checked(path)
 
 
+def test_it_checks_with_the_settings_that_the_mission_is_to_be_driven_with(tmp_path: Path) -> None:
+    mission, settings = tmp_path / "m.toml", tmp_path / "faster.toml"
+    mission.write_text("[rover]\nlength_m = 1.2\nwidth_m = 0.6\n[[target]]\nnorth_m = 30\neast_m = 0\n")
+    settings.write_text('[guidance]\ncontroller = "motion-ga"\n')
+    assert "gaps of 1.9 m or more; with single beams" in checked(mission) and "in --settings" in checked(mission)
+    planned = checked(mission, "--settings", str(settings))
+    assert "gaps of 1.1 m or more; with single beams alone of 1 m, for 3.0 m" in planned and "--settings" not in planned
+    mission.write_text(mission.read_text() + '[sitl]\nsensors = "beams"\n')
+    assert "fields of 1 m (as single beams need)" in checked(mission, "--settings", str(settings))
+    nowhere = CliRunner().invoke(app, ["mission", "check", str(mission), "--settings", str(tmp_path / "no.toml")])
+    assert nowhere.exit_code == 2 and len(nowhere.output.splitlines()) == 1
+
+
 def test_options_say_what_a_ground_stations_file_cannot() -> None:
     output = checked(MISSIONS / "field.plan", "--resolution-m", "0.5", "--radius-m", "0.6", "--speed", "1.5")
     assert "fields of 0.5 m, for gaps of 2.2 m or more, laid round" in output
