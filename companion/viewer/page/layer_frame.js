@@ -37,8 +37,8 @@ export function drawNothingYet(pen, { frame, map, scene }) {
   const { camera, colours } = pen;
   const free = camera.width - camera.coveredRight;
   const [x, y] = [free / 2, (camera.height - camera.covered) / 2];
-  const lines = ["The rover's place is not known yet"];
-  if (frame?.state !== "ended") lines.push("The map begins with it");
+  const lines = ["The rover's place is not known yet", "The map begins with it"];
+  if (frame?.state === "ended") lines.splice(0, 2, "The rover's place was never known");
   const widthIn = (look) => Math.max(...lines.map((line) => pen.widthOf(line, look)));
   const usual = { size: 17, weight: 750 };
   // Beside the map's buttons a phone has little room.

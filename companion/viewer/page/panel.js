@@ -121,7 +121,7 @@ function farTo(frame, target, now) {
 
 // Before the rover knows where it is, nobody knows where the targets are.
 function unplaced(count) {
-  return count ? `${count} ${count === 1 ? "target" : "targets"}, not on the map yet` : "No targets";
+  return count ? `${count} ${count === 1 ? "target" : "targets"}, not on the map` : "No targets";
 }
 
 function readout() {

@@ -130,12 +130,14 @@ const drawn = (model) => {
   drawNothingYet(pen, { map: {}, scene: {}, ...model });
   return texts;
 };
-tell([heads, drawn({ frame }), drawn({ frame: { pose: [0, 0, 0] } }), drawn({ frame, map: { shape: {} } })]);
+const placed = [{ frame: { pose: [0, 0, 0] } }, { frame, map: { shape: {} } }];
+tell([heads, drawn({ frame }), drawn({ frame: { state: "ended" } }), ...placed.map(drawn)]);
 """
-    heads, before, placed, mapped = ran(tmp_path, DOCUMENT + script)
+    heads, before, ended, placed, mapped = ran(tmp_path, DOCUMENT + script)
     assert heads[:2] == ["Connecting", "Waiting for the run to begin"]
     assert heads[2] == "Waiting for the autopilot's heartbeat on udpin:0.0.0.0:14550"
     assert before == ["The rover's place is not known yet", "The map begins with it"] and placed == mapped == []
+    assert ended == ["The rover's place was never known"]
 
 
 def test_only_what_is_fresh_is_called_live(tmp_path: Path) -> None:
