@@ -72,6 +72,10 @@ PLANNED_SHARE = 0.8
 """Motions are planned with so much of the braking there should be, so that the last look seldom says no."""
 
 
+Problems = tuple[MotionProblem, ...]
+"""Of rovers that obey at different times: what is told must be safe for each."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class MotionChoice:
     """What was judged in one tick, and what was told then. Places: metres east and north of ``corner``.
@@ -148,12 +152,13 @@ class MotionController:
         self._time_s = now_s
         self._note_way(view, passed_s)
         problem = self._problem(path, view, model)
-        worst = problem._replace(
+        later = problem._replace(
             start=problem.start._replace(speed_m_s=view.shoots_m_s),
             model=worst_model(model, view.following),
             pending=_pending(view, _latest(view), ALONE_STEP_S),
             step_s=ALONE_STEP_S,
         )
+        worst = _sooner_or_later(later, view)
         problem = problem._replace(admitted_m_s=_admitted(view, worst))
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
             return stop_for(Purpose.BLOCKED)
@@ -193,7 +198,7 @@ class MotionController:
             start, pending, self._window.ground, self._body, model, WEIGHTS, NONE_ADMITTED, HORIZON_S, STEP_S
         )
 
-    def _safe(self, wanted: NDArray[np.float64], view: LocalView, worst: MotionProblem) -> ToldVelocity:
+    def _safe(self, wanted: NDArray[np.float64], view: LocalView, worst: Problems) -> ToldVelocity:
         """This command, or a slower one, or the best way to brake."""
         now_s, speed_m_s, turn_rad_s = self._time_s, float(wanted[0]), float(wanted[1])
         for share in SHARES:
@@ -203,12 +208,12 @@ class MotionController:
                 return told
         return self._braking(view, worst)
 
-    def _braking(self, view: LocalView, worst: MotionProblem) -> ToldVelocity:
+    def _braking(self, view: LocalView, worst: Problems) -> ToldVelocity:
         """The way to brake that keeps most room, straight on where there is enough."""
-        now_s, fastest_rad_s = self._time_s, worst.model.turn_fastest_rad_s
+        now_s, fastest_rad_s = self._time_s, worst[0].model.turn_fastest_rad_s
         spares_m = _braking_spares_m(BRAKE_TURNS * fastest_rad_s, view, worst)
         best = float(BRAKE_TURNS[np.argmax(np.minimum(spares_m, ENOUGH_M) - STRAIGHTER_M * (BRAKE_TURNS != 0.0))])
-        rolls = abs(worst.start.speed_m_s) > STANDS_M_S
+        rolls = abs(worst[0].start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
 
 
@@ -227,13 +232,13 @@ def _is_seen(view: LocalView, point: NedPoint) -> bool:
     return 0 <= x < width and 0 <= y < height and bool(view.evidence.log_odds[y, x] != 0.0)
 
 
-def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
+def _admitted(view: LocalView, worst: Problems) -> NDArray[np.float64]:
     """See ``MotionProblem.admitted_m_s``: the rover may be left alone with these."""
-    turns_rad_s = TURN_SHARES * worst.model.turn_fastest_rad_s
+    turns_rad_s = TURN_SHARES * worst[0].model.turn_fastest_rad_s
     lasts_s = view.settings.guidance.velocity_lasts_s
     gains = turn_gains(view.following, lasts_s)
-    admitted: NDArray[np.float64] = admitted_speeds(
-        turns_rad_s, lasts_s, gains, WEIGHTS.margin_m, _faster_s(view), worst
+    admitted: NDArray[np.float64] = np.minimum.reduce(
+        [admitted_speeds(turns_rad_s, lasts_s, gains, WEIGHTS.margin_m, _faster_s(view), one) for one in worst]
     )
     return admitted
 
@@ -248,22 +253,35 @@ def _faster_s(view: LocalView) -> float:
     return max(FASTER_S, BLUR_S * min(view.rover.beam_rad, MOST_BLUR_RAD)) + DRIFT_SHARE * _alone_s(view)
 
 
-def _braking_spares_m(turns_rad_s: NDArray[np.float64], view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
+def _braking_spares_m(turns_rad_s: NDArray[np.float64], view: LocalView, worst: Problems) -> NDArray[np.float64]:
     """The room that is left where the rover brakes and turns at each of these rates, however much it turns."""
     lasts_s = view.settings.guidance.velocity_lasts_s
-    spares_m: NDArray[np.float64] = braking_spares_m(
-        turns_rad_s, lasts_s, turn_gains(view.following, lasts_s), ENOUGH_M, worst
+    gains = turn_gains(view.following, lasts_s)
+    spares_m: NDArray[np.float64] = np.minimum.reduce(
+        [braking_spares_m(turns_rad_s, lasts_s, gains, ENOUGH_M, one) for one in worst]
     )
     return spares_m
 
 
-def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem) -> bool:
+def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: Problems) -> bool:
     """Whether this may be the last command, however the rover turns."""
-    lasts_s = view.settings.guidance.velocity_lasts_s
+    lasts_s, margin_m, faster_s = view.settings.guidance.velocity_lasts_s, WEIGHTS.margin_m, _faster_s(view)
     gains = turn_gains(view.following, lasts_s)
-    return bool(
-        always_may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gains, WEIGHTS.margin_m, _faster_s(view), worst)
+    return all(
+        always_may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gains, margin_m, faster_s, one) for one in worst
     )
+
+
+def _sooner_or_later(later: MotionProblem, view: LocalView) -> Problems:
+    """The problem of a rover that obeys as late as may be; over a late link also that of one that obeys soon.
+
+    There the turns of half a second are under way, and if they come sooner they lead elsewhere.
+    """
+    follows = view.following
+    if follows.sooner_s <= 0.0:
+        return (later,)
+    soonest = math.floor((follows.dead_s - follows.sooner_s) * (1.0 - follows.off_model) / ALONE_STEP_S + 1e-6)
+    return later, later._replace(pending=_pending(view, soonest, ALONE_STEP_S))
 
 
 def _latest(view: LocalView) -> int:
