@@ -120,6 +120,8 @@ class Notifier:
         if run.vehicle.heartbeat is not None and self._autopilot.signing_trouble:
             self.once(self._autopilot.signing_trouble)
         if run.executor is None:
+            for text in self.lasting_faults((), problems, now_s):  # a full disk can be mended before the mission begins
+                self.once(text)
             return
         if intruder := self._autopilot.intruder(now_s):
             self.once(intruder)

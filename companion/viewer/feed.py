@@ -86,7 +86,7 @@ class ViewerFeed:
         frame = self._frame(self._companion.status())
         if frame["state"] != "ended":
             line, why = ending_of(self._companion, Reason(reason))
-            frame.update(state="ended", line=line, why=why)
+            frame.update(state="ended", line=line, why=why, **wire.NOBODY_DRIVES)
         if self._put({**frame, "news": self._news}):
             self._news = []
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from companion.safety.reasons import EndReason
 from companion.viewer.past import Past
-from companion.viewer.wire import Place, tile_message, tiles_in
+from companion.viewer.wire import NOBODY_DRIVES, Place, tile_message, tiles_in
 
 BACK_S = 1.0
 """A clock that goes back by more than this is another run's."""
@@ -148,7 +148,7 @@ class LiveBoard:
         """Nothing more comes of the run: where it has not said that it ended, its program is gone."""
         if self.frame is not None and self.frame["state"] != "ended":
             line, why = f"ended, {EndReason.GONE.value}", WHERE if self._is_simulated else TAKE_OVER
-            self.take({**self.frame, "news": [], "state": "ended", "line": line, "why": why, "drives": "nobody"})
+            self.take({**self.frame, "news": [], "state": "ended", "line": line, "why": why, **NOBODY_DRIVES})
 
     @property
     def _is_simulated(self) -> bool:

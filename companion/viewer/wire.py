@@ -6,13 +6,15 @@ Imports nothing heavy: the web process lives beside the drive on a small compute
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import IO
 
 HEAD = struct.Struct("<cI")
 JSON, TILES = b"J", b"T"
 MOST_BYTES = 64 * 1024 * 1024
 """A longer message is damage."""
+NOBODY_DRIVES: Mapping[str, object] = {"drives": "nobody", "path": [], "motion": None, "setpoint": None}
+"""Parts of the last frame of a run that has ended otherwise than by itself."""
 
 
 def packed(kind: bytes, payload: bytes) -> bytes:

@@ -207,7 +207,8 @@ def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
         what = f"{run.mission.name} after {run.simulator.time_s:.0f} s of simulated time, {targets}{told}"
     kept = "nothing was written"
     if isinstance(recorder, Recorder):
-        kept = f"record so far: {recorder.directory}; rover-companion report {recorder.directory} shows it"
+        told = recorder.problem or f"record so far: {recorder.directory}"
+        kept = f"{told}; rover-companion report {recorder.directory} shows it"
     return f"{what}; {kept}"
 
 

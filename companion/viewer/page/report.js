@@ -125,9 +125,9 @@ class ReportPage {
     if (this.playback.playing && now - this.shownAt < PANEL_MS) return;
     this.shownAt = now;
     const { scene, frame } = this.model;
-    const cut = this.record.scene.cut && this.playback.t >= this.record.end;
+    const cut = this.record.scene.cut === true && this.playback.t >= this.record.end;
     const silent = silence(frame);
-    this.parts.viewer.classList.toggle("stale", silent !== "" || isLost(frame));
+    this.parts.viewer.classList.toggle("stale", cut || silent !== "" || isLost(frame));
     this.parts.viewer.classList.toggle("lost", silent === "" && isLost(frame));
     this.parts.headline.show(scene, frame, cut ? "The record ends here: it was cut short" : silent);
     this.panel.show();

@@ -329,6 +329,22 @@ def test_it_turns_while_it_brakes_only_for_clearly_more_room(
     assert (leads.choice.told.turn_rad_s > 0.0) is turns
 
 
+def test_over_a_late_link_what_is_told_is_safe_whether_it_is_obeyed_late_or_soon() -> None:
+    """A turn towards a wall is under way; if it comes sooner, the wall is nearer."""
+    evidence = ground()
+    wall(evidence, 4.5, 10.6, 13.0)
+    told = tuple(ToldVelocity(0.05 * step, 1.5, 0.9 if step > 8 else 0.0) for step in range(-30, 17))
+    admitted = []
+    for sooner_s in (0.0, 0.2):
+        follows = Following(dead_s=0.7, sooner_s=sooner_s, off_model=0.1)
+        at = replace(view(evidence, Pose(3.0, 10.0, 0.0, 0.8), 1.5), following=follows, lately=told)
+        leads = controller()
+        leads.follow(PATH, at)
+        assert leads.choice is not None
+        admitted.append(leads.choice.problem.admitted_m_s)
+    assert np.all(admitted[1] <= admitted[0]) and admitted[1].sum() < 0.7 * admitted[0].sum()
+
+
 def test_it_foresees_that_it_backs_off() -> None:
     """Before a wall, with the path behind it, it begins tail first or turns: not on towards the wall."""
     evidence = ground()

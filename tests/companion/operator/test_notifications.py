@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import threading
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from rich.console import Console
@@ -11,6 +13,7 @@ from rich.console import Console
 from companion.cli import live as live_module
 from companion.cli.live import MOST_WAITING, Live
 from companion.core.severity import Severity
+from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.rates import RateFault
@@ -19,6 +22,7 @@ from companion.operator.notifications import FAULT_AFTER_S, SAID_KEPT, News, Not
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase, WaitReason
 from companion.settings import LinkSettings
 from companion.storage.unbuffered import shared_with
+from companion.vehicle.state import VehicleState
 from tests.support.notices import HandClock
 from tests.support.served import wait_until
 from tests.support.tlog import messages
@@ -46,6 +50,14 @@ def test_nothing_is_told_twice_in_a_row_and_what_stays_so_once() -> None:
     assert one.said[3:] == ["c", "b"] and one.news[-2] == News(Severity.WARNING, "c")
     one.note("autopilot: d", Severity.ERROR)
     assert one.said[5:] == [] and one.news[-1] == News(Severity.ERROR, "autopilot: d", own=False)
+
+
+def test_a_record_that_has_ended_is_told_before_the_mission_begins() -> None:
+    one, _ = notifier()
+    run = cast(MissionRun, SimpleNamespace(executor=None, vehicle=VehicleState()))
+    for now_s in (1.0, 2.0):
+        one.tell_faults(run, now_s, ("the record has ended",))
+    assert one.said == ["the record has ended"]
 
 
 def test_only_the_newest_texts_are_kept() -> None:

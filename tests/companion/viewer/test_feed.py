@@ -114,6 +114,7 @@ def test_a_run_that_is_broken_off_says_by_what() -> None:
     last = heard.frames[-1]
     assert (last["state"], last["line"]) == ("ended", "ended, time limit reached: 0 of 1 targets reached")
     assert last["why"].endswith(": not reached")
+    assert last["drives"] == "nobody" and last["path"] == [] and last["setpoint"] is None
 
 
 @pytest.mark.usefixtures("every_tick")

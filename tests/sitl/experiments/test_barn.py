@@ -102,6 +102,15 @@ def test_planned_motions_lead_through_narrow_ground() -> None:
 
 
 @pytest.mark.thorough
+@pytest.mark.skipif(not BARN.exists(), reason="no shared data")
+@pytest.mark.parametrize(("number", "seed"), [(120, 0), (180, 1), (204, 1), (210, 1)])
+def test_over_a_late_link_it_touches_nothing(number: int, seed: int) -> None:
+    """0.2 s each way. Each ended at a post while only the latest effect of what is told was reckoned with."""
+    world = next(one for one in read_worlds(BARN / "worlds.npz") if one.number == number)
+    assert drive(world, "motion-ga", seed, late_s=0.2).end is RunEnd.REACHED
+
+
+@pytest.mark.thorough
 def test_points_take_more_than_twice_the_time_there() -> None:
     motions, points = (drive(made_world(3), name, 0) for name in ("motion-ga", "points"))
     assert motions.seconds < 0.5 * points.seconds
