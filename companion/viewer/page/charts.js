@@ -115,6 +115,7 @@ export class Charts {
   /** Shows what is new, when it is time to. */
   show(now = performance.now()) {
     if (!this.seen) return;
+    for (const part of this.parts) this.showValue(part, part.plot?.cursor.idx); // the same as the large figures say
     const wait = EVERY_MS - (now - this.last);
     if (wait > 0) {
       // What was shown last must be what stays, also if nothing more comes.
@@ -128,7 +129,6 @@ export class Charts {
     if (this.model.figures.version === this.version) {
       for (const part of this.parts) part.plot?.redraw(false, true);
     } else this.fill();
-    for (const part of this.parts) this.showValue(part, part.plot?.cursor.idx);
   }
 
   fill() {
