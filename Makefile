@@ -34,7 +34,7 @@ collect: $(TOOLS)
 
 # More workers than processors: many tests wait for real time.
 pytest: $(TOOLS) $(ALL_KERNELS)
-	$(BIN)/python -m pytest -n 7 --dist worksteal
+	$(BIN)/python -m pytest -n 5 --dist worksteal
 
 # With the drives that show a little more and take long: every mission with every sensor suite, more seeds. Properties
 # are tried with all their examples.
