@@ -52,14 +52,19 @@ def for_link(settings: Settings, link_s: float) -> Settings:
 def late(follows: Following, dead_s: float, link_s: float) -> Following:
     """The same where the link takes ``link_s``, there and back, beyond the first step: that is in any dead time.
 
-    ``dead_s``: as set. The estimate has the link in it, but sees a change of it only seconds later. Until it has, it is
-    too short, and afterwards it may be right: so from then on the rover may do what it is told.
+    ``dead_s``: as set. The estimate has the link in it, but sees a change of it only seconds later.
     """
     late_s = counted_s(link_s) - LINK_STEP_S
-    if late_s <= 0.0:
-        return follows
-    latest_s = max(follows.dead_s, dead_s + late_s)
-    return follows._replace(dead_s=latest_s, sooner_s=latest_s - max(follows.dead_s, late_s))
+    return follows._replace(dead_s=max(follows.dead_s, dead_s + late_s)) if late_s > 0.0 else follows
+
+
+def soonest_s(follows: Following, link_s: float) -> float:
+    """When a command has its effect at the soonest over a late link: as was found, but no sooner than the link allows.
+
+    ``follows``: as found. inf where the link is not late: then the dead time is what is known.
+    """
+    late_s = counted_s(link_s) - LINK_STEP_S
+    return max(follows.dead_s, late_s) if late_s > 0.0 else math.inf
 
 
 def for_guard(settings: Settings, waits_s: float | None) -> Settings:

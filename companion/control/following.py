@@ -27,9 +27,8 @@ LONG_OFF = 0.1
 class Following(NamedTuple):
     """It begins after ``dead_s`` and changes speed and turn rate within limits.
 
-    ``sooner_s``: over a late link it may begin by so much sooner. ``turn_gain``: it turns by this factor more than
-    told. ``off_model``: the rover may be off all this by such a share. ``gains_most_m_s2``: no rover gains speed faster
-    than this.
+    ``turn_gain``: it turns by this factor more than told. ``off_model``: the rover may be off all this by such a share.
+    ``gains_most_m_s2``: no rover gains speed faster than this.
     """
 
     dead_s: float = 0.3
@@ -39,7 +38,6 @@ class Following(NamedTuple):
     turn_gain: float = 1.0
     off_model: float = 0.3
     gains_most_m_s2: float = 1.3
-    sooner_s: float = 0.0
 
 
 def turn_gains(follows: Following, lasts_s: float) -> tuple[float, ...]:

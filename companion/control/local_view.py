@@ -34,7 +34,8 @@ class LocalView:
     ``held_m_s``: so much slower than its throttle would let it go on firm ground; ``dragged_m_s``: and for some time,
     0 where that may have another reason. ``lately_held``: its throttle and steering may still be open from that, see
     ``drag``. ``rolls_back``: it moves tail first.
-    ``following``: how it follows velocities, as far as is known. ``body``: its outline, if it is no circle.
+    ``following``: how it follows velocities, as far as is known; over a late link it may obey after ``soonest_s``, too.
+    ``body``: its outline, if it is no circle.
     ``scans``: so many have been taken into the map.
     """
 
@@ -52,6 +53,7 @@ class LocalView:
     placed_s: float = -math.inf
     rolls_back: bool = False
     following: Following = AS_SHIPPED
+    soonest_s: float = math.inf
     body: Footprint | None = None
     scans: int = 0
 

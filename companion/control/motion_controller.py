@@ -277,10 +277,9 @@ def _sooner_or_later(later: MotionProblem, view: LocalView) -> Problems:
 
     There the turns of half a second are under way, and if they come sooner they lead elsewhere.
     """
-    follows = view.following
-    if follows.sooner_s <= 0.0:
+    if view.soonest_s >= view.following.dead_s:
         return (later,)
-    soonest = math.floor((follows.dead_s - follows.sooner_s) * (1.0 - follows.off_model) / ALONE_STEP_S + 1e-6)
+    soonest = math.floor(view.soonest_s * (1.0 - view.following.off_model) / ALONE_STEP_S + 1e-6)
     return later, later._replace(pending=_pending(view, soonest, ALONE_STEP_S))
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.control.braking import counted_s, for_guard, for_link, late
+from companion.control.braking import counted_s, for_guard, for_link, late, soonest_s
 from companion.control.controller import ControlCommand, Controller
 from companion.control.following import following_of, within_limits
 from companion.control.local_view import LocalView
@@ -491,12 +491,13 @@ class MissionExecutor:
         back = vehicle.forward_m_s < -ROLLS_BACK_M_S
         motion = settings.motion
         self.estimator.assume(following_of(motion, vehicle.parameters))
-        follows = self.estimator.estimate.following(motion.off_model_known)
-        follows = late(follows, motion.dead_s, vehicle.latency_s)
+        found = self.estimator.estimate.following(motion.off_model_known)
+        follows = late(found, motion.dead_s, vehicle.latency_s)
         rover = self._limits if self.controller == "points" else within_limits(self._limits, vehicle.parameters)
         return LocalView(
             pose, vehicle.speed_m_s, self.evidence, rover, settings, rate_rad_s, rolls_back=back,
-            following=follows, body=self._mission.rover.footprint, scans=self._scans,
+            following=follows, soonest_s=soonest_s(found, vehicle.latency_s),
+            body=self._mission.rover.footprint, scans=self._scans,
         )  # fmt: skip
 
     def _moving(self, vehicle: VehicleState, view: LocalView) -> tuple[Moving, ...]:

@@ -335,9 +335,10 @@ def test_over_a_late_link_what_is_told_is_safe_whether_it_is_obeyed_late_or_soon
     wall(evidence, 4.5, 10.6, 13.0)
     told = tuple(ToldVelocity(0.05 * step, 1.5, 0.9 if step > 8 else 0.0) for step in range(-30, 17))
     admitted = []
-    for sooner_s in (0.0, 0.2):
-        follows = Following(dead_s=0.7, sooner_s=sooner_s, off_model=0.1)
-        at = replace(view(evidence, Pose(3.0, 10.0, 0.0, 0.8), 1.5), following=follows, lately=told)
+    for soonest_s in (math.inf, 0.5):
+        follows = Following(dead_s=0.7, off_model=0.1)
+        at = view(evidence, Pose(3.0, 10.0, 0.0, 0.8), 1.5)
+        at = replace(at, following=follows, soonest_s=soonest_s, lately=told)
         leads = controller()
         leads.follow(PATH, at)
         assert leads.choice is not None
