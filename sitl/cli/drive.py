@@ -111,16 +111,17 @@ def drive(
             wanted.check((*files.values(), *mission.files))
             folder = context.with_resource(wanted.record_folder())
             if folder is not None:
-                recorder = Recorder(
-                    folder,
-                    mission,
-                    settings,
-                    seed,
-                    arm=True,
-                    files=files,
-                    start_us=RECORD_START_US,
-                    lidars=[one.text for one in lidars],
-                )
+                with wanted.asked_for():
+                    recorder = Recorder(
+                        folder,
+                        mission,
+                        settings,
+                        seed,
+                        arm=True,
+                        files=files,
+                        start_us=RECORD_START_US,
+                        lidars=[one.text for one in lidars],
+                    )
             with console.status("loading the planner ..."):
                 _say_if_compiling(settings, mission)
                 run = Drive(

@@ -66,6 +66,19 @@ class Outputs:
         with folder as path:
             yield Path(path)
 
+    @contextmanager
+    def asked_for(self) -> Iterator[None]:
+        """A context in which the record is begun; where nobody asked for one, an error names the report. Raises
+        OutputError and RecordError.
+        """
+        try:
+            yield
+        except RecordError as error:
+            if self.record is not None or not isinstance(error.__cause__, OSError):
+                raise
+            reason = error.__cause__.strerror or error.__cause__
+            raise OutputError(f"{self.report}: cannot be written: {reason}; choose another place") from error
+
     def write(self, run: Drive, recorder: Recorder | NullRecorder, console: Console) -> None:
         """Write the files, complete the record with its map, and print where they are.
 

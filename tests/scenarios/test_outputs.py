@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from companion.recording.record_format import RecordError
 from companion.recording.recorder import unused
 from sitl.cli.commands import app
 from tests.support.full_disk import full_after
@@ -92,6 +93,20 @@ def test_a_report_needs_no_record_and_leaves_none(mission: Path, tmp_path: Path)
         bad = CliRunner().invoke(app, ["drive", str(mission), "--report", str(report), other, str(report)])
         assert bad.exit_code == 2 and says in bad.stderr and bad.stderr.count("\n") == 1 and bad.stdout == ""
     assert report_data_in(report) == told, "it is as it was"
+
+
+def test_a_disk_that_is_full_at_the_start_is_told_with_the_file_that_was_asked_for(
+    mission: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise RecordError("/x/.record-1: cannot record here") from OSError(28, "No space left on device")
+
+    monkeypatch.setattr("sitl.cli.drive.Recorder", full)
+    report, record = tmp_path / "r.html", tmp_path / "rec"
+    told = [CliRunner().invoke(app, ["drive", str(mission), option, str(place)])
+            for option, place in (("--report", report), ("--record", record))]  # fmt: skip
+    assert [one.exit_code for one in told] == [2, 2]
+    assert told[0].stderr == f"{report}: {FULL}\n" and "cannot record here" in told[1].stderr
 
 
 @pytest.mark.thorough
