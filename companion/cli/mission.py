@@ -16,7 +16,7 @@ from companion.cli.inputs import EXIT_BAD_INPUT, SkipUnknown, usable_settings
 from companion.cli.source import warn_of_places, warning
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
-from companion.executive.controller_choice import controller_in_force
+from companion.executive.controller_choice import settings_for
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.do_commands import DoCommand
 from companion.mission.field_size import FieldSize, field_size, finer_gap_m
@@ -79,10 +79,7 @@ def warn_of_world(mission: Mission, warn: Callable[[str], None]) -> None:
 
 def _in_force(settings: Settings, mission: Mission) -> Settings:
     """Those of the controller that really leads the rover."""
-    rover, chosen = mission.rover, settings.guidance.controller
-    narrow = _has_beams(mission)
-    kind = controller_in_force(chosen, narrow_sight=narrow, turning_radius_m=rover.turning_radius_m)
-    return settings if kind == chosen else by_points(settings)
+    return settings_for(settings, narrow_sight=_has_beams(mission), turning_radius_m=mission.rover.turning_radius_m)
 
 
 def _doubtful_in(world: SimulatedWorld | None, mission: Mission, resolved: ResolvedMission | None) -> list[str]:

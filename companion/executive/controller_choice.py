@@ -23,8 +23,13 @@ def controller_in_force(kind: ControllerKind, *, narrow_sight: bool, turning_rad
 def settings_in_force(settings: Settings, scan: RangeScan | None, turning_radius_m: float) -> Settings:
     """The settings of the controller in force. ``scan``: any one of the rover's sensor; None: not heard yet."""
     narrow = scan is not None and scan.is_narrow
+    return settings_for(settings, narrow_sight=narrow, turning_radius_m=turning_radius_m)
+
+
+def settings_for(settings: Settings, *, narrow_sight: bool, turning_radius_m: float) -> Settings:
+    """The same where it is known whether the rover sees with single thin beams alone."""
     chosen = settings.guidance.controller
-    kind = controller_in_force(chosen, narrow_sight=narrow, turning_radius_m=turning_radius_m)
+    kind = controller_in_force(chosen, narrow_sight=narrow_sight, turning_radius_m=turning_radius_m)
     return settings if kind == chosen else by_points(settings)
 
 

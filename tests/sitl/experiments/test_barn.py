@@ -102,11 +102,11 @@ def test_planned_motions_lead_through_narrow_ground() -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.skipif(not BARN.exists(), reason="no shared data")
+@needs_barn
 @pytest.mark.parametrize(("number", "seed"), [(120, 0), (180, 1), (204, 1), (210, 1)])
-def test_over_a_late_link_it_touches_nothing(number: int, seed: int) -> None:
+def test_over_a_late_link_it_touches_nothing(worlds: list[BarnWorld], number: int, seed: int) -> None:
     """0.2 s each way. Each ended at a post while only the latest effect of what is told was reckoned with."""
-    world = next(one for one in read_worlds(BARN / "worlds.npz") if one.number == number)
+    world = next(one for one in worlds if one.number == number)
     assert drive(world, "motion-ga", seed, late_s=0.2).end is RunEnd.REACHED
 
 
