@@ -113,23 +113,23 @@ def report(
 
 
 def _check(records: Sequence[Record], forms: Forms) -> None:
-    """All that can be wrong with the outputs, before the work. Raises OutputError, McapError or FilmError."""
+    """All that can be wrong, before anything is made. Raises RecordError, OutputError, McapError or FilmError."""
+    _refuse_silent(records[0])
     for option, file, suffix in forms.suffixes:
         if file is not None and file.suffix.lower() not in suffix:
             raise OutputError(f"{option} {file}: the name must end with {suffix[0]}")
-    for file in forms.files:
-        writable(file)
     apart(forms.files, [file for record in records for file in files_of(record)])
     if forms.mcap is not None:
         check_mcap()
     if forms.mp4 is not None:
         check_ffmpeg()
+    for file in forms.files:
+        writable(file)
 
 
 def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
     """Run the first record again, and write what was asked for; then the others, to compare."""
     first = records[0]
-    _refuse_silent(first)
     clock, tally = record_clock(first), RunTally()
     watched = None if (forms.page or forms.gif or forms.mp4) is None else ReportWatch(first)
     observers: list[ReplayObserver] = [tally, *([] if watched is None else [watched])]

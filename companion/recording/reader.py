@@ -135,6 +135,9 @@ def _meta(directory: Path) -> RecordMeta:
             data = opened.read(MAX_META_BYTES + 1)
     except NotADirectoryError as error:
         raise RecordError(f"{directory}: is no directory; give the directory of a record") from error
+    except FileNotFoundError as error:
+        what = f"is no record ({META} is missing)" if directory.is_dir() else "no such directory"
+        raise RecordError(f"{directory}: {what}; give the directory of a record") from error
     except OSError as error:
         raise RecordError(f"{file}: cannot be read: {error.strerror}; give the directory of a record") from error
     try:

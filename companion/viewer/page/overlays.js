@@ -23,16 +23,26 @@ export function drawContacts(pen, places) {
   nameContacts(pen, spots);
 }
 
+/** The rover where the map is far away: its disc covers so much of the screen round its place. */
+const COVERED_PX = 24;
+
 /** Where the rover stopped, or was held up on its way, as the squares of the timeline; and contacts, over them. */
-export function drawHappenings(pen, events, contacts) {
+export function drawHappenings(pen, events, contacts, pose) {
+  const rover = pose && pen.camera.toScreen(pose[0], pose[1]);
   const [stops, stars] = [events.map((one) => one.place), contacts].map((places) =>
-    places.map((place) => pen.camera.toScreen(...place)),
+    places.map((place) => besideRover(pen.camera.toScreen(...place), rover)),
   );
   for (const [x, y] of [...stops, ...stars]) pen.taken.push([x - 9, y - 9, 18, 18]); // no name lies over a mark
   drawSquares(pen, stops);
   drawStars(pen, stars);
   nameContacts(pen, stars);
   events.forEach(({ name }, i) => pen.label(name, ...stops[i], 12, { size: 12, colour: pen.colours.ink }));
+}
+
+// The rover lies over all marks: one that it would cover stands below it.
+function besideRover([x, y], rover) {
+  if (!rover || Math.hypot(x - rover[0], y - rover[1]) > COVERED_PX) return [x, y];
+  return [rover[0], rover[1] + COVERED_PX];
 }
 
 function drawStars(pen, spots) {

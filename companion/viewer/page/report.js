@@ -87,7 +87,7 @@ class ReportPage {
       const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t);
       const stops = past(this.record.events.filter((event) => event.kind === "stop"));
       const contacts = past(this.record.contacts).map((one) => one.place);
-      drawHappenings(pen, stops, contacts);
+      drawHappenings(pen, stops, contacts, this.model.frame?.pose);
       if (this.choosing) this.decisions.drawCosts(pen);
       else this.others.drawPlaces(pen, this.playback.t);
     });
