@@ -44,7 +44,16 @@ ALONE_STEP_S = 0.05
 LOOKS_S = 0.09
 """The ground is looked at anew after so long, and whenever a scan was mapped: the last look knows that scan, too."""
 WEIGHTS = Weights(
-    margin_m=0.03, margin_s=0.06, tight=4.0, near_m=0.4, risk=0.5, unseen=0.3, turn=0.5, change=0.1, late=0.4
+    margin_m=0.03,
+    margin_s=0.06,
+    tight=4.0,
+    near_m=0.4,
+    risk=0.5,
+    unseen=0.3,
+    turn=0.5,
+    change=0.1,
+    late=0.4,
+    in_line=2.0,
 )
 SHARES = (1.0, 0.7, 0.4, 0.15)
 """Of the speed that was planned, tried in turn until the rover may be left alone with it."""

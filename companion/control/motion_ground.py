@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.control.motion_kernels import Body, MotionGround
+from companion.control.motion_kernels import Body, MotionGround, long_m
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.core.frames import NedPoint
 from companion.mapping.cost_to_go import cost_to_go
@@ -32,6 +32,9 @@ SLOWEST_SHARE = 0.25
 TIGHT_M, TIGHT = 0.1, 4.0
 """With less room than the first it takes longer, up to by the second as a factor more. There motions cost so much that
 else no way through a gap would seem worth it, and the rover would wait before it."""
+IN_LINE = 6.0
+"""Where a long rover cannot turn it takes longer, up to by this as a factor more: so the fastest way to a gap comes
+straight on, and the rover lines up before it, where it still can turn."""
 UNSEEN_FACTOR = 1.3
 """Unseen ground takes so much longer."""
 NEAR_M = 0.3
@@ -102,6 +105,8 @@ def look_round(
     # The roomiest place of each counts: the mean would close gaps that are only just wide enough.
     room_m = np.maximum.reduce([gap_m[row::COARSE, column::COARSE] for row, column in parts]).astype(np.float64)
     pace = _pace(room_m - body.radius_m, COARSE * cell_m, fastest_m_s)
+    if long_m(body) > 0.0:
+        pace *= 1.0 + IN_LINE * np.clip(1.0 - room_m / body.around_m, 0.0, 1.0)
     pace[np.logical_or.reduce([unseen[row::COARSE, column::COARSE] for row, column in parts])] *= UNSEEN_FACTOR
     cells = np.floor((evidence.frame.xys(ahead) - (left, low)) / COARSE).astype(np.int64)
     ends = path.progress + len(ahead) >= len(path.points)

@@ -94,7 +94,8 @@ class Weights(NamedTuple):
     that the rover does not yet point where it must go. ``change``: seconds for a first command that differs from the
     last one by 1 m/s or 1 rad/s. ``late``: seconds for each second on the way and each second that is left from there:
     of two motions with the same end the one that is near it sooner costs less. Else the rover would put off what it
-    could do now, and again the next time.
+    could do now, and again the next time. ``in_line``: seconds for each second that the front of a long rover is later
+    on its way at the end than if it pointed along it.
     """
 
     margin_m: float
@@ -106,6 +107,7 @@ class Weights(NamedTuple):
     turn: float
     change: float
     late: float
+    in_line: float
 
 
 class Start(NamedTuple):
@@ -313,7 +315,29 @@ def _after_s(state, least, problem):
     lacks = model.fastest_m_s - leads_on * max(speed, 0.0)
     slow = lacks * lacks / (2.0 * model.accel_m_s2 * model.fastest_m_s)
     turned = weights.turn * _off_course_rad(togo_s, togo_cell_m, x, y, heading)
+    turned += weights.in_line * _front_lags_s(left, x, y, heading, problem)
     return left + min(slow + turned, left + 1.0)
+
+
+@njit(cache=True, nogil=True)
+def long_m(body):
+    """How far ahead of its place the front disc of a long rover lies; 0 for one that is hardly longer than wide."""
+    front_m, rear_m = body.ahead_m.max(), body.ahead_m.min()
+    return max(front_m, 0.0) if front_m - rear_m >= LONG * body.radius_m else 0.0
+
+
+@njit(cache=True, nogil=True)
+def _front_lags_s(left, x_m, y_m, heading_rad, problem):
+    """How much later the front of a long rover is on its way than if it pointed along it.
+
+    ``left``: the time that is left from its place.
+    """
+    ground, front_m = problem.ground, long_m(problem.body)
+    if front_m == 0.0:
+        return 0.0
+    to_x, to_y = x_m + front_m * math.sin(heading_rad), y_m + front_m * math.cos(heading_rad)
+    in_line_s = max(left - front_m / problem.model.fastest_m_s, 0.0)
+    return max(left_s(ground.togo_s, ground.togo_cell_m, to_x, to_y) - in_line_s, 0.0)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -547,6 +571,8 @@ def evolve(motions, best, chances, kicks, sizes, problem):
     return costs
 
 
+LONG = 1.6
+"""A rover is long if its discs lie along so many times their radius: turning then moves its ends far."""
 TRIED = 10
 """So many speeds are tried, the slower the closer."""
 HALVED = 3

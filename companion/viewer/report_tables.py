@@ -32,7 +32,7 @@ def tables_of(run: Run) -> list[Json]:
     """The tables of one run."""
     done = (_commands(run.result), _laps(run.result))
     return [
-        _targets(run.tally),
+        _targets(run),
         *(table for table in done if table["rows"]),
         _figures(run),
         _stops(run.tally),
@@ -83,17 +83,19 @@ def _compared(value: float | None, first: float | None, digits: int) -> str:
     return f"{value:.{digits}f} ({'±0' if round(off, digits) == 0 else f'{off:+.{digits}f}'})"
 
 
-def _targets(tally: RunTally) -> Json:
-    """What became of each target, when, and how far the way was."""
+def _targets(run: Run) -> Json:
+    """What became of each target, when, and how far the way was; of a patrol in the lap that was begun last."""
+    laps = () if run.result.companion is None else run.result.companion.laps
     rows = [
         [
             leg.name,
             str(NOT_REACHED.get(leg.status, leg.status)),
-            *(_number(value, 1) for value in (leg.reached_s, leg.driven_m, leg.straight_m)),
+            *(_number(value, 1) for value in (leg.ended_s, leg.driven_m, leg.straight_m)),
         ]
-        for leg in tally.legs
+        for leg in run.tally.legs
     ]
-    return {"title": "Targets", "head": ["target", "status", "at s", "driven m", "straight m"], "rows": rows}
+    title = "Targets, in the last lap" if laps else "Targets"
+    return {"title": title, "head": ["target", "status", "at s", "driven m", "straight m"], "rows": rows}
 
 
 def _commands(result: ReplayResult) -> Json:

@@ -38,11 +38,15 @@ class Spell:
 
 @dataclass
 class Leg:
-    """The way to one target. ``reached_s`` is None until then; ``straight_m``: from where the leg began."""
+    """The way to one target, in the lap that was begun last.
+
+    ``ended_s``: when it was reached, skipped or found unreachable; None until then. ``straight_m``: from where the leg
+    began, of a target that was reached.
+    """
 
     name: str
     status: TargetStatus
-    reached_s: float | None = None
+    ended_s: float | None = None
     driven_m: float | None = None
     straight_m: float | None = None
 
@@ -103,7 +107,6 @@ class RunTally(ReplayObserver):
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """See ``ReplayObserver``."""
         self.decisions += 1
-        self.searches += len(decision.searches)
 
     def ticked(self, companion: Companion, time_s: float) -> None:
         """See ``ReplayObserver``."""
@@ -124,6 +127,8 @@ class RunTally(ReplayObserver):
         if here is not None and (not self.track or time_s - self.track[-1][0] >= TRACK_S - 1e-6):
             self.track.append((round(time_s, 2), round(here.north_m, 2), round(here.east_m, 2)))
         self._note_legs(companion, time_s, here)
+        if companion.driver is not None:
+            self.searches = len(companion.driver.searcher.seconds)
 
     def _note_stop(self, companion: Companion, time_s: float, step_s: float) -> None:
         # As the large line has it. What is awaited may change while the rover stands for one reason: that is one stop.
@@ -139,19 +144,22 @@ class RunTally(ReplayObserver):
         self._stopped = stopped
 
     def _note_legs(self, companion: Companion, time_s: float, point: NedPoint | None) -> None:
-        """What has become of the targets. A leg begins where the rover is first led, or where a target was reached."""
+        """What has become of the targets. A leg begins where the rover is first led, or where the last one ended."""
         if self._leg_from is None and companion.mission_run.is_driving:
             self._leg_from, self._leg_from_m = point, self.driven_m
         statuses = companion.statuses()
         if len(self.legs) != len(statuses):
             self.legs = [Leg(name, status) for name, status in statuses]
-        for leg, (_, status) in zip(self.legs, statuses, strict=True):
-            leg.status = status
-            if leg.status is TargetStatus.REACHED and leg.reached_s is None:
-                leg.reached_s, leg.driven_m = time_s, self.driven_m - self._leg_from_m
-                if point is not None and self._leg_from is not None:
-                    leg.straight_m = self._leg_from.distance_m(point)
-                self._leg_from, self._leg_from_m = point, self.driven_m
+        for number, (name, status) in enumerate(statuses):
+            if status is self.legs[number].status:
+                continue
+            leg = self.legs[number] = Leg(name, status)
+            if status is TargetStatus.PENDING:
+                continue  # another lap
+            leg.ended_s, leg.driven_m = time_s, self.driven_m - self._leg_from_m
+            if status is TargetStatus.REACHED and point is not None and self._leg_from is not None:
+                leg.straight_m = self._leg_from.distance_m(point)
+            self._leg_from, self._leg_from_m = point, self.driven_m
 
 
 def _doubt(companion: Companion) -> str:

@@ -97,6 +97,7 @@ export class Actions {
   }
 
   act(action, place) {
+    this.endAim(); // a question that is still open was asked before this
     // The goal that is shown now: by the time this arrives it may be another one.
     const goal = this.model.frame?.goal?.name ?? "";
     const message = { kind: "act", action, goal, t: this.model.frame?.t ?? null, ...(place && { place }) };

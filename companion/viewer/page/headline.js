@@ -43,7 +43,7 @@ export class Headline {
     setText(this.line, line);
     setAttribute(this.line, "data-long", line.length > LONG ? "" : null);
     setText(this.spoken, trouble ? trouble.replace(/ for \d.*/, "") : (frame?.line ?? ""));
-    setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
+    setText(this.why, trouble ? lastKnown(frame) : reason(frame, state, scene));
     this.about.hidden = !scene && !frame; // nothing in it
     setText(this.mission, scene?.mission ?? "");
     setText(this.badge, scene ? badge(scene, state === "ended", trouble, open) : "");
@@ -86,19 +86,20 @@ function reached({ statuses = [] }) {
 
 // While driving the second line says how far it still is, after why it hurries home or makes way; when standing it says
 // why; in the end, what it came to.
-function reason(frame, state) {
+function reason(frame, state, scene) {
   if (!frame) return "";
-  if (state === "ended") return cameTo(frame);
+  if (state === "ended") return cameTo(frame, scene?.targets ?? []);
   if (state !== "driving" && frame.why) return sentence(frame.why);
   if (state !== "driving") return "";
   return [sentence(frame.why), onTheWay(frame)].filter(Boolean).join(" · ");
 }
 
 // Where targets are missed the large line counts them, and `why` names them.
-function cameTo(frame) {
+function cameTo(frame, targets) {
   const all = frame.statuses?.length ?? 0;
   const count = all ? `${reached(frame)} of ${all} targets reached` : "";
   if (!frame.why) return count;
+  if (targets.some(({ name }) => frame.why.startsWith(`${name}:`))) return frame.why; // names stay as they are
   return all && reached(frame) === all ? `${count} · ${sentence(frame.why)}` : sentence(frame.why);
 }
 

@@ -5,7 +5,7 @@ import { make } from "viewer/dom.js";
 /** A number, perhaps with how far it is from another in brackets; or a sign for none. */
 const NUMBER = /^([-−+]?\d[\d.,\s]*%?( \([-−+±]\d[\d.]*\))?|[-–]|)$/;
 /** A word that is wider than a column should be. */
-const LONG = /\S{19}/;
+const LONG = /\S{14}/;
 /** The same of a heading: beside each other there are several records. */
 const LONG_NAME = /[^\s-]{11}/;
 

@@ -40,7 +40,7 @@ MODEL = RoverModel(0.2, 1.0, 1.0, 2.0, 2.0, 0.5, 1.5, 1.0)
 BODY = Body(np.array([-0.1, 0.1]), 0.25, 0.35)
 ALL_ADMITTED = np.tile((2.0, 0.5), (3, 1))
 STANDING = Start(5.0, 2.0, 0.0, 0.0, 0.0)
-WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0, 0.0)
+WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0, 0.0, 2.0)
 
 
 def problem(

@@ -8,10 +8,12 @@ from typing import Any, cast
 import pytest
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
+from companion.executive.mission_progress import TargetStatus
 from companion.safety.reasons import Activity, LatchReason, Reason, RunPhase, WaitReason
 from companion.viewer.run_tally import RunTally
 
 DRIVING = Activity(RunPhase.DRIVING)
+NO_SEARCH = SimpleNamespace(seconds=[])
 
 
 def moment(time_s: float, heard_s: float, activity: Activity = DRIVING) -> Any:
@@ -48,7 +50,7 @@ def test_a_rover_that_is_led_and_does_not_get_on_has_a_row_in_the_table() -> Non
     tally = RunTally()
     for tick in range(1, 201):
         now = moment(0.1 * tick, 0.1 * tick)
-        now.driver = SimpleNamespace(decision=None, makes_way=True, tally=SimpleNamespace(stuck=0))
+        now.driver = SimpleNamespace(decision=None, makes_way=True, tally=SimpleNamespace(stuck=0), searcher=NO_SEARCH)
         now.status().pose = Pose(0.0, 0.0, 0.0, 100.0 + 0.1 * tick)
         tally.ticked(now, 0.1 * tick)
     spell = tally.stood["making way for something that moves"]
@@ -78,3 +80,37 @@ def test_the_track_counts_from_the_first_origin_also_after_the_autopilot_has_got
         now.status().pose = Pose(north_m, 0.0, 0.0, 100.0 + tick)
         tally.ticked(now, float(tick))
     assert [north_m for _, north_m, _ in tally.track] == pytest.approx([24.0, 24.0, 25.0], abs=0.02)
+
+
+def led(tally: RunTally, ticks: range, *statuses: TargetStatus) -> None:
+    """The rover drives north at 2 m/s while its targets are in this state."""
+    for tick in ticks:
+        now = moment(0.1 * tick, 0.1 * tick)
+        now.mission_run.is_driving = True
+        now.mission_run.places = SimpleNamespace(origin=GeoPoint(53.0, 23.0))
+        now.status().pose = Pose(0.2 * tick, 0.0, 0.0, 100.0 + 0.1 * tick)
+        now.statuses = lambda: [(f"target {number}", status) for number, status in enumerate(statuses)]
+        tally.ticked(now, 0.1 * tick)
+
+
+def test_a_leg_begins_where_the_last_target_ended_whatever_became_of_it() -> None:
+    tally, pending, reached = RunTally(), TargetStatus.PENDING, TargetStatus.REACHED
+    led(tally, range(1, 101), pending, pending)
+    led(tally, range(101, 151), TargetStatus.UNREACHABLE, pending)
+    led(tally, range(151, 161), TargetStatus.UNREACHABLE, reached)
+    first, second = tally.legs
+    assert first.ended_s == pytest.approx(10.1) and first.driven_m == pytest.approx(20.0, abs=0.3)
+    assert first.straight_m is None and second.ended_s == pytest.approx(15.1)
+    assert second.driven_m == pytest.approx(10.0, abs=0.3) and second.straight_m == pytest.approx(10.0, abs=0.3)
+
+
+def test_targets_of_a_patrol_have_the_figures_of_the_lap_begun_last() -> None:
+    tally, pending, reached = RunTally(), TargetStatus.PENDING, TargetStatus.REACHED
+    led(tally, range(1, 51), pending, pending)
+    led(tally, range(51, 101), reached, pending)
+    led(tally, range(101, 102), reached, reached)
+    led(tally, range(102, 151), pending, pending)
+    led(tally, range(151, 161), reached, pending)
+    first, second = tally.legs
+    assert first.ended_s == pytest.approx(15.1) and first.driven_m == pytest.approx(10.0, abs=0.3)
+    assert second.status is pending and second.ended_s is None and second.driven_m is None
