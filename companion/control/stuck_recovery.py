@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from companion.control.blind_behind import CREEPS_M_S, is_blind_behind
 from companion.control.controller import STANDSTILL, ControlCommand, Purpose
 from companion.control.local_view import LocalView
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
@@ -116,4 +117,6 @@ class StuckRecovery:
         if speed_m_s < BACK_LEAST_M_S:
             self._back_until_s = view.pose.time_s
             return STANDSTILL
+        if is_blind_behind(view):
+            speed_m_s = min(speed_m_s, CREEPS_M_S)
         return ControlCommand(Purpose.LOOK, GuidedVelocity(-speed_m_s, 0.0), speed_m_s)

@@ -39,9 +39,10 @@ local function update()
   if mode ~= HOLD or not arming:is_armed() then acted = false end
   listen(now_ms, guided)
   if watches and now_ms - heard_ms > waits_ms() then
-    watches, acted = false, true
-    vehicle:set_mode(HOLD)
-    gcs:send_text(4, "Guard: companion silent, HOLD")
+    if vehicle:set_mode(HOLD) then -- else again, 20 ms later
+      watches, acted = false, true
+      gcs:send_text(4, "Guard: companion silent, HOLD")
+    end
   end
   if own and now_ms - told_ms >= 500 then
     told_ms = now_ms

@@ -16,7 +16,6 @@ from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, R
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from companion.settings.settings import CONTROLLERS
-from companion.settings.settings_file import parse_settings
 from sitl.experiments.experiment import (
     OFF_MODEL,
     POINTS,
@@ -27,7 +26,7 @@ from sitl.experiments.experiment import (
     each,
 )
 from sitl.experiments.intervals import ratio_with_interval
-from sitl.experiments.off_model import off_model, parameters_for
+from sitl.experiments.off_model import off_model, parameters_for, taken_for
 from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
 from sitl.generators.kinds import GroundKind
 from sitl.generators.made_ground import MadeGround, made
@@ -66,10 +65,8 @@ class GroundDrive:
 
 def settings_for(controller: str) -> Settings:
     """Points on Theta*'s way; motions on the way of the navigator as shipped."""
-    chosen: dict[str, object] = {"guidance": {"controller": controller}}
-    if controller == POINTS:
-        chosen["navigator"] = {"planner": REFERENCE_PLANNER}
-    return parse_settings(chosen, NAME)
+    navigator = {"navigator": {"planner": REFERENCE_PLANNER}} if controller == POINTS else {}
+    return taken_for(controller, NAME, navigator)
 
 
 def mission_on(ground: MadeGround, controller: str, seed: int) -> Mission:

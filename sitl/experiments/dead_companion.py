@@ -24,7 +24,6 @@ from companion.mission.mission import Mission, SitlSpec
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from companion.settings.settings import ControllerKind
-from companion.settings.settings_file import parse_settings
 from sitl.experiments.experiment import (
     GUARD,
     POINTS,
@@ -37,7 +36,7 @@ from sitl.experiments.experiment import (
     section_by_rule,
     shipped_missions,
 )
-from sitl.experiments.off_model import scenario_off_model
+from sitl.experiments.off_model import scenario_off_model, taken_for
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.scenario import Scenario, scenario_from_mission
@@ -317,7 +316,7 @@ def deaths_of(
 ) -> list[Death]:
     """One drive, cut off at so many moments, drawn evenly from it. ``off``: where motions are planned."""
     scenario = scenario_off_model(mission, seed, 0.0 if controller == POINTS else off, guarded=guarded)
-    settings = parse_settings({"guidance": {"controller": controller}}, NAME)
+    settings = taken_for(controller, NAME)
     told = overheard(mission, seed, settings, scenario)
     moments_s = np.random.default_rng((seed, count)).uniform(told.begin_s, told.end_s, count)
     return die(told, moments_s.tolist())

@@ -12,9 +12,8 @@ from rich.table import Table
 from companion.core.footprint import Footprint
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.recording.recorder import NullRecorder
-from companion.settings.settings_file import parse_settings
 from sitl.experiments.experiment import OFF_MODEL, Advance, ExperimentReport, Options, chosen_controllers, each
-from sitl.experiments.off_model import off_model, parameters_for
+from sitl.experiments.off_model import off_model, parameters_for, taken_for
 from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table
 from sitl.lockstep import Drive, DriveOutcome
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
@@ -76,7 +75,7 @@ def drive(
     start = SimStart(0.5 * SIDE_M, 3.0, math.radians(90.0), SOMEWHERE)
     parameters = {**parameters_for(ROVER, controller), **limits}
     scenario = Scenario(world, start, SENSORS, outline_of(ROVER), parameters, drivetrain=drivetrain)
-    settings = parse_settings({"guidance": {"controller": controller}}, NAME)
+    settings = taken_for(controller, NAME)
     run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report = run.run()
     reached = run.companion.outcome.complete and report.outcome in (DriveOutcome.REACHED, DriveOutcome.COLLISION)

@@ -25,7 +25,6 @@ from companion.mission.mission import DrivetrainSpec, Mission, SitlSpec
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from companion.settings.settings import ControllerKind
-from companion.settings.settings_file import parse_settings
 from companion.storage.files import OsDisk
 from sitl.experiments.dead_companion import SUITES, shipped, with_suite
 from sitl.experiments.experiment import (
@@ -39,7 +38,7 @@ from sitl.experiments.experiment import (
     each,
     section_by_rule,
 )
-from sitl.experiments.off_model import scenario_off_model
+from sitl.experiments.off_model import scenario_off_model, taken_for
 from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table
 from sitl.experiments.soak import Person
 from sitl.lockstep import Drive
@@ -216,7 +215,7 @@ def deaths_of(
 ) -> list[KilledDrive]:
     """As many drives as it takes to die so often. ``off``: where motions are planned."""
     drives: list[KilledDrive] = []
-    settings = parse_settings({"guidance": {"controller": controller}}, NAME)
+    settings = taken_for(controller, NAME)
     while sum(len(one.deaths) for one in drives) < count and len(drives) < count:
         own_off = 0.0 if controller == POINTS else off
         drives.append(

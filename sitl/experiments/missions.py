@@ -13,7 +13,6 @@ from companion.executive.mission_progress import TargetStatus
 from companion.mission.mission import Mission
 from companion.recording.recorder import NullRecorder
 from companion.settings.settings import ControllerKind
-from companion.settings.settings_file import parse_settings
 from sitl.experiments.dead_companion import SUITES, shipped, with_suite
 from sitl.experiments.experiment import (
     OFF_MODEL,
@@ -25,7 +24,7 @@ from sitl.experiments.experiment import (
     each,
 )
 from sitl.experiments.intervals import mean_interval
-from sitl.experiments.off_model import scenario_off_model
+from sitl.experiments.off_model import scenario_off_model, taken_for
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 
@@ -71,7 +70,7 @@ def drive(
     """
     suite = str(mission.sitl.sensors) if mission.sitl is not None else ""
     scenario = scenario_off_model(mission, seed, off, guarded=guarded)
-    settings = parse_settings({"guidance": {"controller": controller}}, NAME)
+    settings = taken_for(controller, NAME)
     run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report, executor = run.run(), run.companion.mission_run.executor
     hits = run.simulator.collisions

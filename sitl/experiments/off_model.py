@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from companion.mission.mission import Mission, RoverSpec
+from companion.settings import Settings
+from companion.settings.settings_file import parse_settings
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.parameters import DEFAULTS
 from sitl.experiments.experiment import GUARD, POINTS
@@ -31,6 +34,20 @@ SHIPPED = Limits(
     math.radians(DEFAULTS["ATC_STR_RAT_MAX"][0]),
     SIM_ROVER.speed_lag_s,
 )
+
+
+def taken_for(controller: str, name: str, chosen: Mapping[str, object] | None = None) -> Settings:
+    """Settings in which the companion takes the rover for one with the limits as shipped.
+
+    They are set, so that they are not read from the autopilot: else it would know the very limits that were drawn.
+    ``name``: of the experiment. ``chosen``: further tables.
+    """
+    motion = {
+        "acceleration_m_s2": SHIPPED.acceleration_m_s2,
+        "deceleration_m_s2": SHIPPED.acceleration_m_s2,
+        "turn_acceleration_rad_s2": SHIPPED.turn_acceleration_rad_s2,
+    }
+    return parse_settings({"guidance": {"controller": controller}, "motion": motion, **(chosen or {})}, name)
 
 
 def parameters_for(rover: RoverSpec, controller: str) -> dict[str, float]:
