@@ -73,6 +73,10 @@ ARC_M, ARC_M_S, ARC_SHARES = 2.5, 0.7, (0.0, -1.0, 1.0)
 """How far, how fast and with which shares of the sharpest curvature a rover drives off that cannot turn on the spot."""
 
 
+STEPS_M = 0.02
+"""A way that gets on by less between two moments says nothing of the heading."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Option:
     """Something to do, and where the rover then is at each moment.
@@ -144,7 +148,7 @@ def avoided(
     margins_m = view.settings.traffic.margin_m + view.settings.traffic.drift_m_s * times_s
 
     def room_m(option: Option, share: float) -> float:
-        return least_room_m(option.places, discs, times_s, share * margins_m)
+        return least_room_m(_middles(option.places, view), discs, times_s, share * margins_m)
 
     places = foresees(times_s) if foresees is not None and command.purpose is Purpose.DRIVE else None
     if places is None:
@@ -162,7 +166,7 @@ def avoided(
             return option
         options.append(option)
 
-    ends = [(option, first_near(option.places, discs, times_s, NEAR_M)) for option in options]
+    ends = [(option, first_near(_middles(option.places, view), discs, times_s, NEAR_M)) for option in options]
     if any(near.least_m >= 0.0 for _, near in ends):
         return max(ends, key=lambda one: one[1].least_m)[0]
     latest_s = max(near.first_s for _, near in ends)
@@ -191,7 +195,7 @@ def _may_be_the_last(command: ControlCommand, view: LocalView, discs: Points) ->
         (here.north_m + along_m * math.cos(bearing_rad), here.east_m + along_m * math.sin(bearing_rad))
     )
     margins_m = np.full(len(times_s), HALF_MARGIN * view.settings.traffic.margin_m)
-    return least_room_m(places, discs, times_s, margins_m) >= 0.0
+    return least_room_m(_middles(places, view), discs, times_s, margins_m) >= 0.0
 
 
 class CollisionAvoidance:
@@ -239,11 +243,27 @@ def _matters(one: Moving, view: LocalView) -> bool:
 
 def _discs(moving: tuple[Moving, ...], view: LocalView) -> Points:
     """Rows for ``least_room_m``: place now, velocity, and how near the middles may come."""
-    rows = []
+    rows, body, round_m = [], view.footprint, view.rover.radius_m
+    if _ahead_m(view) != 0.0:
+        round_m = math.hypot(0.5 * (body.front_m + body.rear_m), body.half_width_m)
     for one in moving:
         here = one.at(view.pose.time_s)
-        rows.append((here.north_m, here.east_m, one.north_m_s, one.east_m_s, one.radius_m + view.rover.radius_m))
+        rows.append((here.north_m, here.east_m, one.north_m_s, one.east_m_s, one.radius_m + round_m))
     return np.array(rows)
+
+
+def _ahead_m(view: LocalView) -> float:
+    """How far the middle of the outline lies ahead of the rover's place."""
+    return 0.5 * (view.footprint.front_m - view.footprint.rear_m)
+
+
+def _middles(places: Points, view: LocalView) -> Points:
+    """Where the middle of the outline is while the rover's place is at ``places``.
+
+    A circle round the place would be much larger than one round the middle where that lies far ahead or behind.
+    """
+    ahead_m = _ahead_m(view)
+    return places if ahead_m == 0.0 else middles_of(places, view.pose.heading_rad, ahead_m)
 
 
 def _halted(outlook: Outlook) -> Points:
@@ -415,6 +435,26 @@ def least_room_m(places: Points, discs: Points, times_s: Points, margins_m: Poin
             room_m = math.hypot(to_n, to_e) - touch_m - min(margins_m[i], max(now_m - 0.02, 0.0))
             least_m = min(least_m, room_m)
     return least_m
+
+
+@njit(cache=True, nogil=True)
+def middles_of(places: Points, heading_rad: float, ahead_m: float) -> Points:
+    """Each place moved ahead along the heading there: that of the way, or against it where the rover rolls back.
+
+    A rover that hardly moves keeps its heading.
+    """
+    middles = np.empty_like(places)
+    for i in range(places.shape[0]):
+        if i > 0:
+            north_m, east_m = places[i, 0] - places[i - 1, 0], places[i, 1] - places[i - 1, 1]
+            if math.hypot(north_m, east_m) > STEPS_M:
+                course_rad = math.atan2(east_m, north_m)
+                if math.cos(course_rad - heading_rad) < 0.0:
+                    course_rad += math.pi
+                heading_rad = course_rad
+        middles[i, 0] = places[i, 0] + ahead_m * math.cos(heading_rad)
+        middles[i, 1] = places[i, 1] + ahead_m * math.sin(heading_rad)
+    return middles
 
 
 class Near(NamedTuple):

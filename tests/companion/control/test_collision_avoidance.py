@@ -8,12 +8,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.control.collision_avoidance import CollisionAvoidance, Option, avoided, first_near, least_room_m
+from companion.control.collision_avoidance import (
+    CollisionAvoidance,
+    Option,
+    avoided,
+    first_near,
+    least_room_m,
+    middles_of,
+)
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.motion_prediction import Points
 from companion.control.reference_path import ReferencePath
 from companion.control.setpoint_check import fault_of
+from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -277,3 +285,18 @@ def test_who_makes_way_is_patient_for_a_while_and_anew_each_time() -> None:
     assert not giver.is_patient(31.0, 30.0, yields=True)
     assert not giver.is_patient(40.0, 30.0, yields=False)
     assert giver.is_patient(41.0, 30.0, yields=True), "it has got on meanwhile"
+
+
+def test_the_middle_lies_along_the_way_also_where_it_rolls_back_or_turns_on_the_spot() -> None:
+    on, back = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 1.0]]), np.array([[0.0, 0.0], [0.0, 0.0], [-1.0, 0.0]])
+    assert middles_of(on, 0.5 * math.pi, 0.4) == pytest.approx(np.array([[0.0, 0.4], [0.0, 1.4], [1.4, 1.0]]))
+    assert middles_of(back, 0.0, 0.4) == pytest.approx(np.array([[0.4, 0.0], [0.4, 0.0], [-0.6, 0.0]]))
+
+
+@pytest.mark.parametrize(("ahead_m", "makes_way"), [(0.4, True), (-0.4, False)])
+def test_only_where_the_outline_reaches_a_long_rover_is_in_the_way(ahead_m: float, makes_way: bool) -> None:
+    """Something passes 1.6 m ahead of its place, 0.5 m in radius: its nose reaches 1.1 m ahead, or 0.3 m."""
+    body = Footprint.rectangle(1.4, 0.6, ahead_m)
+    at = replace(view(0.0), body=body, rover=RoverLimits(body.radius_m, 2.0, 8.0))
+    option = avoided(stop_for(Purpose.BLOCKED), None, at, (crossing(-3.0, 1.2, north_m=21.6),))
+    assert option.yields is makes_way
