@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated
@@ -112,6 +113,13 @@ def experiment(
             min=0.0, max=2.0, help=f"{', '.join(WITH_LATE)}: seconds that a message takes over the link, each way."
         ),
     ] = 0.0,
+    outline: Annotated[
+        str,
+        typer.Option(
+            metavar="LENGTHxWIDTH",
+            help="gates: the rover's outline in metres, 2.0x0.5 for example; default: 0.9x0.7.",
+        ),
+    ] = "",
     keep: Annotated[
         Path | None,
         typer.Option(
@@ -144,7 +152,7 @@ def experiment(
         _refuse_unused(name, planners=planners, world=world, maps=maps)
         options = Options(
             runs, seed, jobs, maps, tuple(world or ()), names_in(planners), worlds, names_in(controllers),
-            names_in(setups), guard, off, late, keep, names_in(missions),
+            names_in(setups), guard, off, late, keep, names_in(missions), _outline_m(outline),
         )  # fmt: skip
         _refuse_unused_motion(name, options)
         report = _with_progress(name, options, console)
@@ -155,6 +163,21 @@ def experiment(
     except (ExperimentError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
+
+
+def _outline_m(given: str) -> tuple[float, float] | None:
+    """Length and width in metres. Raises ExperimentError."""
+    if not given:
+        return None
+    try:
+        length_m, width_m = (float(one) for one in given.split("x"))
+    except ValueError:
+        length_m = width_m = math.nan
+    if not 0.1 <= width_m <= length_m <= 5.0:
+        raise ExperimentError(
+            f"--outline {given!r:.40}: give length and width in metres, 0.1 to 5, the length first: 2.0x0.5"
+        )
+    return length_m, width_m
 
 
 def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: Path | None) -> None:
@@ -172,6 +195,8 @@ def _refuse_unused_motion(name: str, options: Options) -> None:
     """The same, of the options about motion. Raises ExperimentError."""
     if options.archive and name != "barn":
         raise ExperimentError(f"--worlds: {name} does not take it; the option is for barn")
+    if options.outline_m is not None and name != "gates":
+        raise ExperimentError(f"--outline: {name} does not take it; the option is for gates")
     if options.setups and name != "barn":
         raise ExperimentError(f"--setups: {name} does not take it; the option is for barn")
     for option, is_given, takers in (

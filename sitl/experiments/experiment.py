@@ -75,6 +75,8 @@ class Options:
     """The folder in which the results of single runs are kept; None: nowhere."""
     missions: tuple[str, ...] = ()
     """Which of those that ship with the project; none: all."""
+    outline_m: tuple[float, float] | None = None
+    """``gates``: length and width of the rover; None: the experiment's own."""
 
     def command(self, name: str) -> str:
         """What writes this experiment's part of the results page again."""
@@ -85,6 +87,7 @@ class Options:
         chosen += " --guard" if self.guard else ""
         chosen += "" if self.off == OFF_MODEL else f" --off {self.off:g}"
         chosen += f" --late {self.late_s:g}" if self.late_s else ""
+        chosen += "" if self.outline_m is None else f" --outline {'x'.join(f'{one:g}' for one in self.outline_m)}"
         chosen += f" --worlds {self.archive.name}" if self.archive else ""
         chosen += f" --maps {self.maps.name}" if self.maps else ""
         return f"rover-sitl experiment {name} --runs {self.runs} --seed {self.seed}{chosen} --docs docs"

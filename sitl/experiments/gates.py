@@ -22,9 +22,10 @@ from sitl.world.world import World
 
 NAME = "gates"
 OUTLINE = Footprint.rectangle(0.9, 0.7)
-ROVER = RoverSpec(OUTLINE.radius_m, 2.0, 0.0, OUTLINE)
+SPEED_M_S = 2.0
 SENSORS = "lidar-360"
-WIDTHS_M = (0.8, 0.9, 1.0, 1.2, 1.5)
+MORE_M = (0.1, 0.2, 0.3, 0.5, 0.8)
+"""The gates are so much wider than the rover."""
 ANGLES_DEG = (0.0, 30.0, 60.0)
 SIDE_M, FINE_M = 20.0, 0.025
 THICK_M = 0.2
@@ -47,6 +48,16 @@ class GateDrive:
     seconds: float
 
 
+def outline_of_rover(options: Options) -> Footprint:
+    """What was asked for, or our own."""
+    return OUTLINE if options.outline_m is None else Footprint.rectangle(*options.outline_m)
+
+
+def widths_m(outline: Footprint) -> list[float]:
+    """Of the gates."""
+    return [round(2.0 * outline.half_width_m + more_m, 3) for more_m in MORE_M]
+
+
 def world_of(width_m: float, angle_deg: float, aside_m: float) -> World:
     """A walled yard, and across its middle a wall that is turned by an angle, with a gap."""
     along = (np.arange(round(SIDE_M / FINE_M)) + 0.5) * FINE_M - 0.5 * SIDE_M
@@ -62,19 +73,26 @@ def world_of(width_m: float, angle_deg: float, aside_m: float) -> World:
 
 
 def drive(
-    controller: str, width_m: float, angle_deg: float, seed: int, off: float = OFF_MODEL, late_s: float = 0.0
+    controller: str,
+    width_m: float,
+    angle_deg: float,
+    seed: int,
+    off: float = OFF_MODEL,
+    late_s: float = 0.0,
+    outline: Footprint = OUTLINE,
 ) -> GateDrive:
     """One drive from one side of the wall to the other."""
+    rover = RoverSpec(outline.radius_m, SPEED_M_S, 0.0, outline)
     rng = np.random.default_rng((seed, 53))
     world = world_of(width_m, angle_deg, float(rng.uniform(-ASIDE_M, ASIDE_M)))
     drivetrain, limits = off_model(rng, off)
     goal = Target("goal", HomePoint(0.0, SIDE_M - 6.0), 0.0, OnBlocked.SKIP)
     sitl = SitlSpec(heading_deg=90.0, sensors=SENSORS)
     grid = GridSpec(margin_m=9.0, by_footprint=True)
-    mission = Mission(f"gate {width_m:g} m", (goal,), grid, ROVER, sitl=sitl)
+    mission = Mission(f"gate {width_m:g} m", (goal,), grid, rover, sitl=sitl)
     start = SimStart(0.5 * SIDE_M, 3.0, math.radians(90.0), SOMEWHERE)
-    parameters = {**parameters_for(ROVER, controller), **limits}
-    scenario = Scenario(world, start, SENSORS, outline_of(ROVER), parameters, drivetrain=drivetrain)
+    parameters = {**parameters_for(rover, controller), **limits}
+    scenario = Scenario(world, start, SENSORS, outline_of(rover), parameters, drivetrain=drivetrain)
     settings = taken_for(controller, NAME)
     run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report = run.run()
@@ -90,6 +108,12 @@ class GatesReport(ExperimentReport):
     options: Options
     drives: tuple[GateDrive, ...]
 
+    @property
+    def section_name(self) -> str:
+        """See ``ExperimentReport``."""
+        size = "" if self.options.outline_m is None else "-" + "x".join(f"{one:g}" for one in self.options.outline_m)
+        return super().section_name + size
+
     def tables(self) -> list[Table]:
         """One, a row a controller and width."""
         return [terminal_table(f"{NAME}: reached of {self.options.runs}", HEAD, self._rows())]
@@ -102,7 +126,7 @@ class GatesReport(ExperimentReport):
     def _rows(self) -> list[list[str]]:
         rows = []
         for name in dict.fromkeys(one.controller for one in self.drives):
-            for width_m in WIDTHS_M:
+            for width_m in widths_m(outline_of_rover(self.options)):
                 own = [one for one in self.drives if (one.controller, one.width_m) == (name, width_m)]
                 reached = [sum(one.reached for one in own if one.angle_deg == angle) for angle in ANGLES_DEG]
                 times_s = [one.seconds for one in own if one.reached]
@@ -114,8 +138,9 @@ class GatesReport(ExperimentReport):
 
     def section(self) -> str:
         """See ``ExperimentReport``."""
-        size = f"{OUTLINE.front_m + OUTLINE.rear_m:g} x {2.0 * OUTLINE.half_width_m:g} m"
-        return f"""## Gates
+        outline = outline_of_rover(self.options)
+        size = f"{outline.front_m + outline.rear_m:g} x {2.0 * outline.half_width_m:g} m"
+        return f"""## Gates{"" if self.options.outline_m is None else f": a rover of {size}"}
 
 `{self.options.command(NAME)}`
 
@@ -131,10 +156,11 @@ The mission has nothing but a target. Planned motions have the guard on the auto
 
 def run(options: Options, advance: Advance) -> GatesReport:
     """Every controller through every gate."""
+    outline = outline_of_rover(options)
     tasks = [
-        (name, width_m, angle_deg, seed, options.off, options.late_s)
+        (name, width_m, angle_deg, seed, options.off, options.late_s, outline)
         for name in chosen_controllers(options, ("motion-ga",))
-        for width_m in WIDTHS_M
+        for width_m in widths_m(outline)
         for angle_deg in ANGLES_DEG
         for seed in range(options.seed, options.seed + options.runs)
     ]
