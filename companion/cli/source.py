@@ -12,7 +12,7 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import Signer
 from companion.mavlink.transport import ByteLink, open_link
-from companion.mission.doubtful_places import doubtful_places
+from companion.mission.doubtful_places import doubtful_places, home_at_edge
 from companion.mission.given import NOTHING_GIVEN, Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
@@ -109,8 +109,8 @@ def refuse_arming(mission: Mission, *, arm: bool) -> Mission:
 
 
 def warn_of_places(mission: Mission, warn: Callable[[str], None]) -> None:
-    """Say which targets are far from the file's own home, or seem to have latitude and longitude swapped."""
-    for line in doubtful_places(mission):
+    """Say which targets are far from the file's own home or seem to be swapped, and that home is at the edge."""
+    for line in (*doubtful_places(mission), *filter(None, [home_at_edge(mission)])):
         warn(line)
 
 

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
-from companion.mission.doubtful_places import FAR_M, distance_text, doubtful_places, great_circle_m
+from companion.core.grid import Cell
+from companion.mission.doubtful_places import FAR_M, distance_text, doubtful_places, great_circle_m, home_at_edge
 from companion.mission.load import load_mission
-from companion.mission.mission import HomePoint, Mission, MissionError, Place, Target
+from companion.mission.mission import GridSpec, HomePoint, Mission, MissionError, Place, RoverSpec, Target
 
 HOME = GeoPoint(53.1325, 23.1688)
 NEAR = LocalFrame(HOME).to_geo(NedPoint(60.0, 30.0))
@@ -109,3 +110,13 @@ def test_on_short_ways_the_distance_is_that_of_the_local_frame(
 )
 def test_distances_in_words(distance_m: float, text: str) -> None:
     assert distance_text(distance_m) == text
+
+
+@pytest.mark.parametrize(
+    ("home", "says"), [((0, 24), True), ((1, 24), False), ((50, 49), True), ((99, 24), True), ((50, 24), False)]
+)
+def test_a_rover_that_reaches_over_the_edge_of_its_grid_is_told_of(home: tuple[int, int], says: bool) -> None:
+    grid = GridSpec(1.0, (100, 50), Cell(*home))
+    line = home_at_edge(Mission("m", (), grid, RoverSpec(0.67)))
+    assert bool(line) is says and ("0.5 m from the edge" in line) is says
+    assert home_at_edge(Mission("m", (), GridSpec(), RoverSpec(0.67))) == ""
