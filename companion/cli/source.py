@@ -110,7 +110,7 @@ def refuse_arming(mission: Mission, *, arm: bool) -> Mission:
 
 def warn_of_places(mission: Mission, warn: Callable[[str], None]) -> None:
     """Say which targets are far from the file's own home or seem to be swapped, and that home is at the edge."""
-    for line in (*doubtful_places(mission), *filter(None, [home_at_edge(mission)])):
+    for line in (*doubtful_places(mission), *home_at_edge(mission)):
         warn(line)
 
 

@@ -106,6 +106,8 @@ class StuckRecovery:
     def backing(self, view: LocalView) -> ControlCommand | None:
         """Straight back over ground that is known to be free, and no farther; None when not under way.
 
+        Where much of that ground was never seen it creeps.
+
         A rover that still turns stands first: it would not go straight.
         """
         if not self.is_backing(view.pose.time_s):

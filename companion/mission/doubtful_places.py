@@ -24,19 +24,19 @@ def doubtful_places(mission: Mission, home: GeoPoint | None = None) -> list[str]
     return [line for _, line in _doubts(mission, home)]
 
 
-def home_at_edge(mission: Mission) -> str:
-    """A line if the rover reaches over the edge of the mission's grid where it begins; empty if it does not."""
+def home_at_edge(mission: Mission) -> list[str]:
+    """A line if the rover reaches over the edge of the mission's grid where it begins."""
     grid, reach_m = mission.grid, mission.rover.radius_m
     if grid.size is None or grid.home is None:
-        return ""
+        return []
     fields = min(*grid.home, grid.size[0] - 1 - grid.home.x, grid.size[1] - 1 - grid.home.y)
     edge_m = (fields + 0.5) * grid.resolution_m
     if reach_m <= edge_m:
-        return ""
-    return (
+        return []
+    return [
         f"home is {edge_m:g} m from the edge of the grid, and the rover reaches {reach_m:.2f} m round its place: it "
         "may not be able to begin; put grid.home farther inside, or leave out grid.size"
-    )
+    ]
 
 
 def most_doubtful(mission: Mission, home: GeoPoint) -> str:

@@ -129,7 +129,8 @@ class ReportPage {
     const silent = silence(frame);
     this.parts.viewer.classList.toggle("stale", cut || silent !== "" || isLost(frame));
     this.parts.viewer.classList.toggle("lost", silent === "" && isLost(frame));
-    this.parts.headline.show(scene, frame, cut ? "The record was cut short here: killed, power lost, or the disk full" : silent);
+    const ending = "The record was cut short here: killed, power lost, or the disk full";
+    this.parts.headline.show(scene, frame, cut ? ending : silent);
     this.panel.show();
     this.decisions.show(this.playback.t);
     this.charts.show();
