@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -97,10 +98,11 @@ def report(
         if show and page is None:
             raise OutputError("--open shows the HTML file: name it with --out as well")
         forms = Forms(page, csv, mcap, gif, mp4)
-        _check(records, forms)
-        for note in (note for record in records for note in record.notes):
-            typer.echo(note, err=True)
-        runs = _made(records, forms)
+        with _no_empty_folder(csv):
+            _check(records, forms)
+            for note in (note for record in records for note in record.notes):
+                typer.echo(note, err=True)
+            runs = _made(records, forms)
     except (RecordError, MapError, McapError, FilmError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -110,6 +112,19 @@ def report(
         address = page.resolve().as_uri()
         if not webbrowser.open(address):
             typer.echo(f"no browser was found on this computer; open {address}", err=True)
+
+
+@contextlib.contextmanager
+def _no_empty_folder(folder: Path | None) -> Iterator[None]:
+    """A context after whose errors a folder that was made in it is gone, if nothing is in it."""
+    existed = folder is None or folder.exists()
+    try:
+        yield
+    except Exception:
+        if folder is not None and not existed:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+        raise
 
 
 def _check(records: Sequence[Record], forms: Forms) -> None:

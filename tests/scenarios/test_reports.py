@@ -449,6 +449,14 @@ def test_a_full_disk_leaves_what_was_there_and_nothing_cut(
     assert {file.read_text() for file in old} == {"old"}
 
 
+@pytest.mark.thorough
+def test_a_full_disk_leaves_no_empty_folder(record: Path, tmp_path: Path) -> None:
+    with full_after(1000):
+        result = CliRunner().invoke(app, ["report", str(record), "--csv", str(tmp_path / "new")])
+    assert result.exit_code == 2 and "cannot be written" in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.fixture(scope="module")
 def broken_off(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The record of a drive that was broken off in its middle."""
