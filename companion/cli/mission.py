@@ -19,6 +19,7 @@ from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.executive.controller_choice import settings_for
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.do_commands import DoCommand
+from companion.mission.doubtful_places import doubtful_places
 from companion.mission.field_size import FieldSize, field_size, finer_gap_m
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
@@ -60,7 +61,7 @@ def check(
             check_start(mission, world)
         _check_start_known(mission)
         settings = _in_force(settings, mission)
-        resolved = _try_resolve(mission, settings)
+        resolved = _resolved(mission, settings)
     except (MissionError, MapError, SettingsError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -92,6 +93,17 @@ def _check_start_known(mission: Mission) -> None:
     if sitl is not None and sitl.world is not None and sitl.start is None and mission.grid.home is None:
         says = f"missing; give the field of {sitl.world} in which the rover starts"
         raise MissionError(f"{mission.source or mission.name}: sitl.start: {says}")
+
+
+def _resolved(mission: Mission, settings: Settings) -> ResolvedMission | None:
+    """Like ``_try_resolve``. Where the grid is too large, all places that may be the reason are named first."""
+    try:
+        return _try_resolve(mission, settings)
+    except GridTooLargeError as error:
+        for line in doubtful_places(mission):
+            if line not in str(error):
+                typer.echo(warning(line), err=True)
+        raise
 
 
 def _try_resolve(mission: Mission, settings: Settings) -> ResolvedMission | None:

@@ -75,7 +75,7 @@ def report(
     mcap: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="Write the first DIR for Foxglove and Lichtblick (needs rover-companion\\[mcap])."
+            metavar="FILE", help="Write the first DIR for Foxglove and Lichtblick (needs the extra `mcap`)."
         ),
     ] = None,
     gif: Annotated[

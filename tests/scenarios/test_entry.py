@@ -200,3 +200,4 @@ def test_no_page_of_help_is_wider_than_a_narrow_terminal(
         told = CliRunner().invoke(commands, [name, "--help"], terminal_width=60)
         assert told.exit_code == 0 and "…" not in told.output, name
         assert max(map(len, told.output.splitlines())) <= 60, name
+        assert "\\[" not in told.output, name
