@@ -27,6 +27,8 @@ LAST_MS = 1600
 BEFORE_S = 2.0
 """So much before the rover is first driven the film begins."""
 COLOURS = 96
+CUT = "the record was cut short here"
+"""What a film of such a record says at its end: the rover may have gone on."""
 FFMPEG = "ffmpeg"
 Json = dict[str, Any]
 
@@ -52,6 +54,8 @@ class Film:
             raise FilmError("--gif and --mp4: the mission had not begun, there is no map to show")
         drives = next((frame["t"] for frame in frames if frame["state"] == "driving"), frames[-1]["t"])
         self._frames = [frame for frame in frames if frame["t"] >= drives - BEFORE_S]
+        if data["scene"]["cut"]:
+            self._frames.append({**self._frames[-1], "state": "cut", "line": CUT, "speed": None})
         places = [(frame["t"], frame["pose"][:2]) for frame in frames if frame["pose"]]
         shown = [place for _, place in places] + [one["place"] for one in data["scene"]["targets"]]
         section = section_of(data["scene"], shown)

@@ -32,6 +32,7 @@ from companion.viewer.frame import doing_of
 from companion.viewer.headway import Headway
 from companion.viewer.report_csv import FILES
 from companion.viewer.report_data import ReportWatch, as_json, counted, joined, run_of
+from companion.viewer.report_film import Film
 from companion.viewer.report_page import report_page
 from companion.viewer.report_tables import tables_of
 from companion.viewer.run_tally import RunTally
@@ -338,6 +339,18 @@ def test_where_there_is_no_browser_open_says_what_to_open(
     result = CliRunner().invoke(app, ["report", str(record), "--out", str(file), "--open"])
     assert result.exit_code == 0
     assert result.stderr == f"no browser was found on this computer; open {file.resolve().as_uri()}\n"
+
+
+@pytest.mark.thorough
+def test_a_film_of_a_record_that_was_cut_says_so_at_its_end(broken_off: Path) -> None:
+    """The rover may have driven on."""
+    record = load_record(broken_off)
+    tally, watched = RunTally(), ReportWatch(record)
+    data = joined(record, watched, run_of(record, tally, replay(record, Observers((tally, watched)))), [])
+    assert not data["scene"]["cut"] and Film(data).moments()[-1]["state"] != "cut"
+    data["scene"]["cut"] = True
+    last = Film(data).moments()[-1]
+    assert (last["line"], last["speed"]) == ("the record was cut short here", None)
 
 
 def test_there_is_no_film_of_a_mission_that_had_not_begun(tmp_path: Path) -> None:

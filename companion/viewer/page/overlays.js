@@ -25,24 +25,52 @@ export function drawContacts(pen, places) {
 
 /** The rover where the map is far away: its disc covers so much of the screen round its place. */
 const COVERED_PX = 24;
+/** A mark that it would cover stands so far below it. */
+const AWAY_PX = 34;
 
 /** Where the rover stopped, or was held up on its way, as the squares of the timeline; and contacts, over them. */
 export function drawHappenings(pen, events, contacts, pose) {
-  const rover = pose && pen.camera.toScreen(pose[0], pose[1]);
-  const [stops, stars] = [events.map((one) => one.place), contacts].map((places) =>
-    places.map((place) => besideRover(pen.camera.toScreen(...place), rover)),
-  );
-  for (const [x, y] of [...stops, ...stars]) pen.taken.push([x - 9, y - 9, 18, 18]); // no name lies over a mark
+  const [stops, stars] = spotsOf(pen, events, contacts, pose);
+  drawLeaders(pen, [...stops, ...stars]);
   drawSquares(pen, stops);
   drawStars(pen, stars);
   nameContacts(pen, stars);
   events.forEach(({ name }, i) => pen.label(name, ...stops[i], 12, { size: 12, colour: pen.colours.ink }));
 }
 
+/** Takes the room of these marks, so that no name lies under or over them. */
+export function claimHappenings(pen, events, contacts, pose) {
+  for (const [x, y] of spotsOf(pen, events, contacts, pose).flat()) pen.taken.push([x - 9, y - 9, 18, 18]);
+}
+
+// Where marks of stops and of contacts stand on the screen: [x, y], and where each happened if that is elsewhere.
+function spotsOf(pen, events, contacts, pose) {
+  const rover = pose && pen.camera.toScreen(pose[0], pose[1]);
+  return [events.map((one) => one.place), contacts].map((places) =>
+    places.map((place) => besideRover(pen.camera.toScreen(...place), rover)),
+  );
+}
+
 // The rover lies over all marks: one that it would cover stands below it.
 function besideRover([x, y], rover) {
   if (!rover || Math.hypot(x - rover[0], y - rover[1]) > COVERED_PX) return [x, y];
-  return [rover[0], rover[1] + COVERED_PX];
+  return [rover[0], rover[1] + AWAY_PX, [x, y]];
+}
+
+// From a mark that stands below the rover to the place that it is about.
+function drawLeaders(pen, spots) {
+  for (const [x, y, place] of spots) {
+    if (!place) continue;
+    for (const [colour, width] of [
+      [pen.colours.halo, 6],
+      [pen.colours.ink, 2],
+    ]) {
+      pen.context.beginPath();
+      pen.context.moveTo(x, y);
+      pen.context.lineTo(...place);
+      pen.stroke(colour, width);
+    }
+  }
 }
 
 function drawStars(pen, spots) {

@@ -9,7 +9,7 @@ import { isLost, silence } from "viewer/freshness.js";
 import { listen, listenKeys } from "viewer/gestures.js";
 import { MapView } from "viewer/map_view.js";
 import { Model } from "viewer/model.js";
-import { drawHappenings, Others } from "viewer/overlays.js";
+import { claimHappenings, drawHappenings, Others } from "viewer/overlays.js";
 import { Panel } from "viewer/panel.js";
 import { Playback } from "viewer/playback.js";
 import { readRecord, Record } from "viewer/record.js";
@@ -74,20 +74,25 @@ class ReportPage {
     return this.tabs.chosen === "Decisions";
   }
 
+  // Stops and places of contacts up to now, and where the rover is.
+  happenings() {
+    const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t);
+    const stops = past(this.record.events.filter((event) => event.kind === "stop"));
+    return [stops, past(this.record.contacts).map((one) => one.place), this.model.frame?.pose];
+  }
+
   drawExtras() {
     this.view.besides.push(() => (this.choosing ? [] : this.others.places()));
     // Candidates and other records together would be a tangle of lines.
     this.view.below.push((pen) => {
+      claimHappenings(pen, ...this.happenings());
       if (!this.choosing) this.others.drawTracks(pen);
     });
     this.view.between.push((pen) => {
       if (this.choosing) this.decisions.drawLines(pen); // no name of a target lies under them
     });
     this.view.above.push((pen) => {
-      const past = (list) => list.filter((one) => one.place && one.t <= this.playback.t);
-      const stops = past(this.record.events.filter((event) => event.kind === "stop"));
-      const contacts = past(this.record.contacts).map((one) => one.place);
-      drawHappenings(pen, stops, contacts, this.model.frame?.pose);
+      drawHappenings(pen, ...this.happenings());
       if (this.choosing) this.decisions.drawCosts(pen);
       else this.others.drawPlaces(pen, this.playback.t);
     });
