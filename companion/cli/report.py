@@ -74,9 +74,7 @@ def report(
     ] = None,
     mcap: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Write the first DIR for Foxglove and Lichtblick (needs the extra `mcap`)."
-        ),
+        typer.Option(metavar="FILE", help="Write the first DIR for Foxglove and Lichtblick (needs the extra `mcap`)."),
     ] = None,
     gif: Annotated[
         Path | None,

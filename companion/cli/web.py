@@ -24,9 +24,7 @@ SOMEWHERE = ("192.0.2.1", 9)
 
 Web = Annotated[
     str | None,
-    typer.Option(
-        "--web", metavar="[HOST:]PORT", help="Serve a page that shows the run (needs the extra `web`)."
-    ),
+    typer.Option("--web", metavar="[HOST:]PORT", help="Serve a page that shows the run (needs the extra `web`)."),
 ]
 Token = Annotated[
     Path | None,

@@ -89,8 +89,8 @@ def experiment(
     setups: Annotated[
         str,
         typer.Option(
-            help="barn: guarded, strict (without the guard), jackal (a Jackal's limits), separated by commas; "
-            "default: guarded."
+            help="barn: guarded, strict (without the guard), jackal (a Jackal's limits), separated by commas; gates: "
+            "one of the first two; default: guarded."
         ),
     ] = "",
     missions: Annotated[
@@ -197,8 +197,8 @@ def _refuse_unused_motion(name: str, options: Options) -> None:
         raise ExperimentError(f"--worlds: {name} does not take it; the option is for barn")
     if options.outline_m is not None and name != "gates":
         raise ExperimentError(f"--outline: {name} does not take it; the option is for gates")
-    if options.setups and name != "barn":
-        raise ExperimentError(f"--setups: {name} does not take it; the option is for barn")
+    if options.setups and name not in ("barn", "gates"):
+        raise ExperimentError(f"--setups: {name} does not take it; the option is for barn and gates")
     for option, is_given, takers in (
         ("--controllers", bool(options.controllers), WITH_CONTROLLERS),
         ("--guard", options.guard, WITH_GUARD),

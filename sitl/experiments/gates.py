@@ -12,7 +12,15 @@ from rich.table import Table
 from companion.core.footprint import Footprint
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.recording.recorder import NullRecorder
-from sitl.experiments.experiment import OFF_MODEL, Advance, ExperimentReport, Options, chosen_controllers, each
+from sitl.experiments.experiment import (
+    OFF_MODEL,
+    Advance,
+    ExperimentError,
+    ExperimentReport,
+    Options,
+    chosen_controllers,
+    each,
+)
 from sitl.experiments.off_model import off_model, parameters_for, taken_for
 from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table
 from sitl.lockstep import Drive, DriveOutcome
@@ -21,6 +29,7 @@ from sitl.world.truth import SimStart
 from sitl.world.world import World
 
 NAME = "gates"
+GUARDED, STRICT = "guarded", "strict"
 OUTLINE = Footprint.rectangle(0.9, 0.7)
 SPEED_M_S = 2.0
 SENSORS = "lidar-360"
@@ -80,8 +89,9 @@ def drive(
     off: float = OFF_MODEL,
     late_s: float = 0.0,
     outline: Footprint = OUTLINE,
+    guarded: bool = True,
 ) -> GateDrive:
-    """One drive from one side of the wall to the other."""
+    """One drive from one side of the wall to the other. ``guarded``: planned motions have the guard."""
     rover = RoverSpec(outline.radius_m, SPEED_M_S, 0.0, outline)
     rng = np.random.default_rng((seed, 53))
     world = world_of(width_m, angle_deg, float(rng.uniform(-ASIDE_M, ASIDE_M)))
@@ -91,7 +101,7 @@ def drive(
     grid = GridSpec(margin_m=9.0, by_footprint=True)
     mission = Mission(f"gate {width_m:g} m", (goal,), grid, rover, sitl=sitl)
     start = SimStart(0.5 * SIDE_M, 3.0, math.radians(90.0), SOMEWHERE)
-    parameters = {**parameters_for(rover, controller), **limits}
+    parameters = {**parameters_for(rover, controller, guarded=guarded), **limits}
     scenario = Scenario(world, start, SENSORS, outline_of(rover), parameters, drivetrain=drivetrain)
     settings = taken_for(controller, NAME)
     run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
@@ -112,7 +122,7 @@ class GatesReport(ExperimentReport):
     def section_name(self) -> str:
         """See ``ExperimentReport``."""
         size = "" if self.options.outline_m is None else "-" + "x".join(f"{one:g}" for one in self.options.outline_m)
-        return super().section_name + size
+        return super().section_name + ("" if _is_guarded(self.options) else f"-{STRICT}") + size
 
     def tables(self) -> list[Table]:
         """One, a row a controller and width."""
@@ -140,25 +150,34 @@ class GatesReport(ExperimentReport):
         """See ``ExperimentReport``."""
         outline = outline_of_rover(self.options)
         size = f"{outline.front_m + outline.rear_m:g} x {2.0 * outline.half_width_m:g} m"
-        return f"""## Gates{"" if self.options.outline_m is None else f": a rover of {size}"}
+        guarded = _is_guarded(self.options)
+        head = ("" if guarded else f", {STRICT}") + ("" if self.options.outline_m is None else f": a rover of {size}")
+        return f"""## Gates{head}
 
 `{self.options.command(NAME)}`
 
 A wall across a yard of {SIDE_M:g} m with one gap, straight on and turned by 30 and 60 degrees, up to {ASIDE_M:g} m
 beside the line to the goal. The rover's outline is {size},
 with `{SENSORS}`, at 2 m/s. Its speed, lag, turn rate and limits are {self.options.mismatch}.
-The mission has nothing but a target. Planned motions have the guard on the autopilot. Drives of
-{self.options.runs} that reached the goal, all contacts, and the mean driving time:
+The mission has nothing but a target. Planned motions have {"the" if guarded else "no"} guard on the autopilot. Drives
+of {self.options.runs} that reached the goal, all contacts, and the mean driving time:
 
 {markdown_table(HEAD, self._rows())}
 """
 
 
+def _is_guarded(options: Options) -> bool:
+    """Raises ExperimentError for a setup that does not exist, or for both."""
+    if options.setups not in ((), (GUARDED,), (STRICT,)):
+        raise ExperimentError(f"--setups {','.join(options.setups):.60}: gates take {GUARDED} or {STRICT}")
+    return options.setups != (STRICT,)
+
+
 def run(options: Options, advance: Advance) -> GatesReport:
-    """Every controller through every gate."""
-    outline = outline_of_rover(options)
+    """Every controller through every gate. Raises ExperimentError for setups that there are not."""
+    outline, guarded = outline_of_rover(options), _is_guarded(options)
     tasks = [
-        (name, width_m, angle_deg, seed, options.off, options.late_s, outline)
+        (name, width_m, angle_deg, seed, options.off, options.late_s, outline, guarded)
         for name in chosen_controllers(options, ("motion-ga",))
         for width_m in widths_m(outline)
         for angle_deg in ANGLES_DEG

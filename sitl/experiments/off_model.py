@@ -50,9 +50,9 @@ def taken_for(controller: str, name: str, chosen: Mapping[str, object] | None = 
     return parse_settings({"guidance": {"controller": controller}, "motion": motion, **(chosen or {})}, name)
 
 
-def parameters_for(rover: RoverSpec, controller: str) -> dict[str, float]:
-    """Of the autopilot, as recommended; with the guard where motions are planned."""
-    guard = {} if controller == POINTS else GUARD
+def parameters_for(rover: RoverSpec, controller: str, *, guarded: bool = True) -> dict[str, float]:
+    """Of the autopilot, as recommended. ``guarded``: with the guard where motions are planned."""
+    guard = GUARD if guarded and controller != POINTS else {}
     return {"WP_SPEED": rover.cruise_speed_m_s, **RECOMMENDED_PARAMETERS, **guard}
 
 

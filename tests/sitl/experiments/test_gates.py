@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,6 +48,24 @@ def test_gates_are_as_much_wider_whatever_the_rover_is_and_the_command_names_it(
     report = GatesReport(options, drives)
     assert [row[2] for row in report._rows()] == ["1"] * 5
     assert "--outline 2x0.5" in report.section() and report.section_name == "gates-2x0.5"
+
+
+def test_gates_are_driven_with_the_guard_or_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[bool] = []
+
+    def quick(*task: Any) -> GateDrive:
+        asked.append(task[-1])
+        return GateDrive("motion-ga", 0.9, 0.0, 0, True, 0, 9.0)
+
+    monkeypatch.setattr(gates, "drive", quick)
+    for setups, guarded in (("guarded", True), ("strict", False)):
+        report = gates.run(Options(runs=1, setups=(setups,)), lambda done, of: None)
+        assert set(asked) == {guarded} and ("no guard" in report.section()) is not guarded
+        assert report.section_name == ("gates" if guarded else "gates-strict")
+        asked.clear()
+    for wrong in ("jackal", "guarded,strict"):
+        refused = CliRunner().invoke(app, ["experiment", "gates", "--setups", wrong])
+        assert refused.exit_code == 2 and f"--setups {wrong}: gates take guarded or strict" in refused.output
 
 
 @pytest.mark.parametrize("given", ["2.0", "0.5x2.0", "axb", "9x1", "1x1x1", "nanx1"])
