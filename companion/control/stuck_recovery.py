@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 from companion.control.blind_behind import CREEPS_M_S, is_blind_behind
 from companion.control.controller import STANDSTILL, ControlCommand, Purpose
+from companion.control.following import GUARDED_S
 from companion.control.local_view import LocalView
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
@@ -30,6 +31,9 @@ posts half a metre apart, other gaps would be closed with them."""
 CIRCLES_M = (1.0, 2.0, 4.0)
 LINGERS_PER_M = 4.0
 """In a circle the rover may stay for so many times ``stuck_after_s`` for each metre of its radius."""
+PATIENT = 5.0
+"""Motions planned without a guard have so many times longer: into a gap of 0.2 m more than its width a rover creeps a few
+centimetres a second."""
 TURNS_RAD_S = 0.3
 """A rover that turns slower goes back straight."""
 
@@ -81,7 +85,7 @@ class StuckRecovery:
         if last is None or pose.point.distance_m(last.pose.point) >= MOVED_M:
             self._progress = Progress(pose, pose.time_s, pose.time_s)
             return False
-        limit_s = view.settings.guidance.stuck_after_s
+        limit_s = _patience_s(view)
         if abs(wrap_pi_rad(pose.heading_rad - last.pose.heading_rad)) >= TURNED_RAD:
             here = replace(pose, north_m=last.pose.north_m, east_m=last.pose.east_m)
             self._progress = Progress(here, last.moved_s, pose.time_s)
@@ -122,3 +126,10 @@ class StuckRecovery:
         if is_blind_behind(view):
             speed_m_s = min(speed_m_s, CREEPS_M_S)
         return ControlCommand(Purpose.LOOK, GuidedVelocity(-speed_m_s, 0.0), speed_m_s)
+
+
+def _patience_s(view: LocalView) -> float:
+    """How long the rover may make no progress. In a narrow gap no more than a creep may be told without a guard."""
+    guidance = view.settings.guidance
+    creeps = guidance.controller != "points" and guidance.velocity_lasts_s > GUARDED_S
+    return (PATIENT if creeps else 1.0) * guidance.stuck_after_s

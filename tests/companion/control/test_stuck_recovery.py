@@ -12,6 +12,7 @@ from companion.control.stuck_recovery import (
     FRESH_PENALTY,
     LINGERS_PER_M,
     MOVED_M,
+    PATIENT,
     SAME_PLACE_M,
     TRIES_AT_ONE_PLACE,
     TURNED_RAD,
@@ -22,6 +23,7 @@ from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.settings import Settings
+from companion.settings.settings_file import parse_settings
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
 SETTINGS = Settings()
@@ -54,6 +56,19 @@ def test_a_rover_that_stays_where_it_is_is_stuck_and_sooner_where_it_is_blocked(
 ) -> None:
     assert not watching().is_stuck(view(limit_s - 0.01), command)
     assert watching().is_stuck(view(limit_s), command)
+
+
+@pytest.mark.parametrize(
+    ("controller", "lasts_s", "patient"), [("motion-ga", 3.0, PATIENT), ("motion-ga", 0.3, 1.0), ("points", 3.0, 1.0)]
+)
+def test_motions_without_a_guard_have_longer_as_little_speed_may_be_told_in_a_gap(
+    controller: str, lasts_s: float, patient: float
+) -> None:
+    settings = parse_settings({"guidance": {"controller": controller, "velocity_lasts_s": lasts_s}}, "test")
+    before, then = (
+        replace(view(time_s), settings=settings) for time_s in (patient * LIMIT_S - 0.01, patient * LIMIT_S)
+    )
+    assert not watching().is_stuck(before, DRIVE) and watching().is_stuck(then, DRIVE)
 
 
 def test_moving_on_counts_from_anew_and_turning_counts_for_a_while() -> None:
