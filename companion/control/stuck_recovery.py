@@ -32,8 +32,8 @@ CIRCLES_M = (1.0, 2.0, 4.0)
 LINGERS_PER_M = 4.0
 """In a circle the rover may stay for so many times ``stuck_after_s`` for each metre of its radius."""
 PATIENT = 5.0
-"""Motions planned without a guard have so many times longer: into a gap of 0.2 m more than its width a rover creeps a few
-centimetres a second."""
+"""Motions planned without a guard have so many times longer: into a gap of 0.2 m more than its width a rover creeps a
+few centimetres a second."""
 TURNS_RAD_S = 0.3
 """A rover that turns slower goes back straight."""
 
