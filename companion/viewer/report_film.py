@@ -54,7 +54,7 @@ class Film:
             raise FilmError("--gif and --mp4: the mission had not begun, there is no map to show")
         drives = next((frame["t"] for frame in frames if frame["state"] == "driving"), frames[-1]["t"])
         self._frames = [frame for frame in frames if frame["t"] >= drives - BEFORE_S]
-        if data["scene"].get("cut"):
+        if data["scene"]["cut"]:
             self._frames.append({**self._frames[-1], "state": "cut", "line": CUT, "speed": None})
         places = [(frame["t"], frame["pose"][:2]) for frame in frames if frame["pose"]]
         shown = [place for _, place in places] + [one["place"] for one in data["scene"]["targets"]]

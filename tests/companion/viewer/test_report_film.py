@@ -26,6 +26,7 @@ from companion.viewer.wire import tile_message
 
 GROUND = {"south_m": -50.0, "west_m": -50.0, "cell_m": 0.25, "columns": 400, "rows": 400, "tile": 64}
 SCENE: dict[str, Any] = {
+    "cut": False,
     "map": GROUND,
     "targets": [{"name": "a very long name that must stay within the picture", "place": [0.0, 30.0]}],
     "borders": [],
