@@ -40,3 +40,8 @@ def is_blind_behind(view: LocalView) -> bool:
     x, y = x.clip(0, width - 1), y.clip(0, height - 1)
     seen = on_map & ((evidence.log_odds[y, x] != 0.0) | (evidence.stamps[y, x] != 0))
     return bool(np.count_nonzero(~seen) > MOST_UNSEEN * seen.size)
+
+
+def backwards_m_s(wanted_m_s: float, view: LocalView) -> float:
+    """So fast it may roll back at most that is to roll back at this speed: where the ground is unseen it creeps."""
+    return min(wanted_m_s, CREEPS_M_S) if is_blind_behind(view) else wanted_m_s

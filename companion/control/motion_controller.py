@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.control.blind_behind import CREEPS_M_S, is_blind_behind
+from companion.control.blind_behind import backwards_m_s
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.following import GUARDED_S, Following, turn_gains
 from companion.control.local_view import LocalView
@@ -331,11 +331,9 @@ def rover_model(view: LocalView) -> RoverModel:
     fastest_m_s = min(rover.cruise_speed_m_s, rover.told_most_m_s)
     if view.may_be_dragged:
         fastest_m_s = min(fastest_m_s, view.speed_m_s + FASTER_DRAGGED_M_S)
-    backwards_m_s = min(limits.backwards_m_s, fastest_m_s)
-    if is_blind_behind(view):
-        backwards_m_s = min(backwards_m_s, CREEPS_M_S)
+    back_m_s = backwards_m_s(min(limits.backwards_m_s, fastest_m_s), view)
     return RoverModel(
         own.dead_s, own.acceleration_m_s2, PLANNED_SHARE * own.deceleration_m_s2, own.turn_acceleration_rad_s2,
-        fastest_m_s, backwards_m_s, min(limits.turn_rad_s, rover.turns_most_rad_s),
+        fastest_m_s, back_m_s, min(limits.turn_rad_s, rover.turns_most_rad_s),
         own.turn_gain,
     )  # fmt: skip

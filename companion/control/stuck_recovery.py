@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.control.blind_behind import CREEPS_M_S, is_blind_behind
+from companion.control.blind_behind import backwards_m_s
 from companion.control.controller import STANDSTILL, ControlCommand, Purpose
 from companion.control.following import GUARDED_S
 from companion.control.local_view import LocalView
@@ -110,9 +110,8 @@ class StuckRecovery:
     def backing(self, view: LocalView) -> ControlCommand | None:
         """Straight back over ground that is known to be free, and no farther; None when not under way.
 
-        Where much of that ground was never seen it creeps.
-
-        A rover that still turns stands first: it would not go straight.
+        Where much of that ground was never seen it creeps. A rover that still turns stands first: it would not go
+        straight.
         """
         if not self.is_backing(view.pose.time_s):
             return None
@@ -123,8 +122,7 @@ class StuckRecovery:
         if speed_m_s < BACK_LEAST_M_S:
             self._back_until_s = view.pose.time_s
             return STANDSTILL
-        if is_blind_behind(view):
-            speed_m_s = min(speed_m_s, CREEPS_M_S)
+        speed_m_s = backwards_m_s(speed_m_s, view)
         return ControlCommand(Purpose.LOOK, GuidedVelocity(-speed_m_s, 0.0), speed_m_s)
 
 
