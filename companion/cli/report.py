@@ -91,6 +91,7 @@ def report(
     read or written.
     """
     try:
+        _refuse_twice(directories)
         records = [load_record(directory) for directory in directories]
         page = out if out or csv or mcap or gif or mp4 else directories[0] / NAME
         if show and page is None:
@@ -114,11 +115,11 @@ def report(
 
 @contextlib.contextmanager
 def _no_empty_folder(folder: Path | None) -> Iterator[None]:
-    """A context after whose errors a folder that was made in it is gone, if nothing is in it."""
+    """A context after whose errors, or Ctrl-C, a folder that was made in it is gone, if nothing is in it."""
     existed = folder is None or folder.exists()
     try:
         yield
-    except Exception:
+    except BaseException:
         if folder is not None and not existed:
             with contextlib.suppress(OSError):
                 folder.rmdir()
@@ -191,6 +192,14 @@ def write_report(record: Record, file: Path) -> str:
     result = watched_replay(record, tally, watched)
     run = named([run_of(record, tally, result)])[0]
     return _page_written(record, joined(record, watched, run, []), file)
+
+
+def _refuse_twice(directories: Sequence[Path]) -> None:
+    """Raises RecordError where a record would be compared with itself."""
+    places = [directory.resolve() for directory in directories]
+    for number, place in enumerate(places):
+        if place in places[:number]:
+            raise RecordError(f"{directories[number]}: is named twice; name each record once")
 
 
 def _refuse_silent(record: Record) -> None:

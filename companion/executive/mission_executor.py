@@ -560,10 +560,13 @@ class MissionExecutor:
                 f"Map fields of {side_m:.3g} m may close gaps below {gap_m:.1f} m; smaller ones open more, "
                 f"of {size.fine_m:.2g} m down to {fine_m:.1f} m"
             )
-            self._notifier.tell(text, Severity.INFO)
-        elif self._scan.is_narrow or rover.turning_radius_m > 0.0:
-            needs = "single beams need wide ones, a lidar sees more" if self._scan.is_narrow else "arcs need wide ones"
-            self._notifier.tell(f"Gaps below {gap_m:.1f} m may count as closed: {needs}", Severity.INFO)
+        else:
+            text = f"Gaps below {gap_m:.1f} m may count as closed"
+            if self._scan.is_narrow:
+                text += ": single beams need wide ones, a lidar sees more"
+            elif rover.turning_radius_m > 0.0:
+                text += ": arcs need wide ones"
+        self._notifier.tell(text, Severity.INFO)
 
     def _take_decision(self, decision: Decision, at: NedPoint, now_s: float) -> None:
         goal = self.progress.goal

@@ -3,7 +3,8 @@
 A packet: 0x55AA, type, number of points, angles of the first and the last point, check sum, then the points. Numbers
 are little endian, two bytes each but for type and number. Angles: bit 0 is always set, the others count 1/64 degree;
 distances count 1/4 mm. The check sum is the exclusive or of all words but itself. The laser sits beside the receiver,
-so the direction of a near point differs from the angle that the packet tells.
+so the direction of a point differs from the angle that the packet tells, by -8 degrees far away. Without an echo
+nothing is there along all of the laser's ray, which leads that way, too.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from companion.lidar.points import Floats, Points, joined, next_header
 HEADER = b"\xaa\x55"
 HEAD_BYTES, MOST_POINTS = 10, 40
 BASE_MM, FOCUS_MM = 155.3, 21.8
-"""Of the manual's formula for the direction of near points."""
+"""Of the manual's formula for the direction of points: beside the receiver, and where the ray crosses its axis."""
 MOST_STEP_DEG = 3.0
 """Between two points of a packet; ten turns a second and 5000 points are 0.7 degrees apart."""
 
@@ -76,6 +77,6 @@ def _points(packet: bytes) -> Points | None:
 
 
 def _aside_deg(range_mm: Floats) -> Floats:
-    """How much the direction of each point differs from the angle of its packet."""
-    seen_mm = np.where(range_mm > 0.0, range_mm, BASE_MM)
-    return np.degrees(np.arctan(FOCUS_MM * (BASE_MM - seen_mm) / (BASE_MM * seen_mm)))
+    """How much the direction of each point differs from the angle of its packet; without an echo: of the ray's end."""
+    seen_mm = np.where(range_mm > 0.0, range_mm, np.inf)
+    return np.degrees(np.arctan(FOCUS_MM * (1.0 / seen_mm - 1.0 / BASE_MM)))

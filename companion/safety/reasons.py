@@ -143,8 +143,8 @@ class EndReason(Enum):
 class Parting(Enum):
     """How a run leaves the rover, where a person who walks up to it must know."""
 
-    ARMED = "the rover is still armed, in {}"
-    NOT_HELD = "the rover is still armed, and has not confirmed HOLD"
+    ARMED = "the rover was left armed, in {}"
+    NOT_HELD = "the rover was left armed, and has not confirmed HOLD"
     SILENT = "the autopilot is silent: whether the rover stands is not known"
 
 

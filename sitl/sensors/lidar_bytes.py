@@ -53,7 +53,7 @@ class Encoder(Protocol):
         ...
 
     def aside_deg(self, range_m: Floats) -> Floats:
-        """How far beside the told angle a point of this range lies."""
+        """How far beside the told angle a point of this range lies; 0 m: none was met."""
         ...
 
 
@@ -202,11 +202,13 @@ class YdlidarEncoder:
         return answer
 
     def aside_deg(self, range_m: Floats) -> Floats:
-        """The manual's formula: the laser looks across the receiver's axis."""
-        range_mm = 1000.0 * range_m
-        with np.errstate(divide="ignore"):
-            tangent = 21.8 * (155.3 - range_mm) / (155.3 * range_mm)
-        return np.where(range_mm > 0.0, np.degrees(np.arctan(tangent)), 0.0)
+        """The manual's formula: the laser's ray begins 21.8 mm beside the receiver, and crosses its axis 155.3 mm ahead.
+
+        Where it meets nothing it ends far away, where the formula tends to -8 degrees.
+        """
+        range_mm = np.where(range_m > 0.0, 1000.0 * range_m, 1e9)
+        tangent: Floats = 21.8 * (155.3 - range_mm) / (155.3 * range_mm)
+        return np.degrees(np.arctan(tangent))
 
 
 def ydlidar_packet(kind: int, points: list[tuple[int, int]]) -> bytes:

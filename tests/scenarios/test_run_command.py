@@ -147,7 +147,7 @@ def test_a_signal_while_driving_stops_the_rover(tmp_path: Path, number: signal.S
         assert world.simulator.collisions == ()
     assert code == 130
     assert "gate: pending" in out and "Traceback" not in err
-    assert "the rover is still armed, in HOLD" in err.splitlines()
+    assert "the rover was left armed, in HOLD" in err.splitlines()
     seen = load_map(record / "map.yaml")  # as far as it was seen, not the grid that was kept
     assert seen.contains(seen.cell_at(NedPoint(0.0, 0.0))) and 1 < seen.width < 24
     again = replay(load_record(record))

@@ -36,6 +36,15 @@ def room(noise_m: float = 0.0, name: str = "LD19", seed: int = 1, **mounted: obj
     return SerialLidar(where, World(obstacles), noise_m, np.random.default_rng(seed))
 
 
+def gateway(name: str) -> tuple[SerialLidar, World]:
+    """A lidar before a wall with a gap of 1 m; behind the gap and round the lidar there is nothing within its reach."""
+    obstacles = np.zeros((40, 40), np.bool_)
+    obstacles[23, :] = True
+    obstacles[23, 20] = False
+    world = World(obstacles)
+    return SerialLidar(MountedLidar(MAKES[name]), world, 0.0, np.random.default_rng(1)), world
+
+
 MIDDLE = RoverPose(5.0, 5.0, 0.0)
 """Of that room; the rover looks north."""
 

@@ -189,6 +189,7 @@ COARSE = "Map fields of 1 m may close gaps below 2.4 m; smaller ones open more"
     [
         (True, 0.0, 1.0, f"{COARSE}, of 0.15 m down to 1.0 m"),
         (True, 1.0, 1.0, f"{COARSE}, of 0.25 m down to 1.2 m"),
+        (True, 0.0, 0.15, "Gaps below 1.0 m may count as closed"),
         (True, 1.0, 0.25, "Gaps below 1.2 m may count as closed: arcs need wide ones"),
         (False, 0.0, 1.0, "Gaps below 2.4 m may count as closed: single beams need wide ones, a lidar sees more"),
     ],

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from companion.lidar.ldrobot import crc8
 from companion.lidar.models import MODELS, model_named
 from companion.lidar.points import Decoder
-from tests.support.lidars import NAMES, decoded, room, started, stream, to_walls_m
+from sitl.sensors.serial_lidar import RoverPose
+from tests.support.lidars import NAMES, decoded, gateway, room, started, stream, to_walls_m
 
 BYTES = st.binary(max_size=400)
 CUTS = st.lists(st.integers(0, 3000), max_size=12)
@@ -48,6 +49,20 @@ def test_ranges_and_directions_are_those_of_the_room(name: str) -> None:
     # An eighth of a degree of rounding is 2 cm on a wall seen at 45 degrees; LD06 and YDLIDAR interpolate.
     assert np.abs(points.range_m - true_m).max() < 0.04
     assert np.all((points.angle_deg >= 0.0) & (points.angle_deg < 360.0))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_stands_where_no_echo_comes_from(name: str) -> None:
+    device, world = gateway(name)
+    pose = RoverPose(20.2, 20.4, 0.0)
+    data = stream(started(device, b"".join(model(name).start)), 0.4, pose)
+    points = decoded(decoder(name), data)
+    silent_deg = points.angle_deg[points.range_m == 0.0]
+    seen_m = world.rays_m(pose.north_m, pose.east_m, np.radians(silent_deg).reshape(-1, 1), model(name).max_m, 0.0)
+    through = np.abs((silent_deg + 180.0) % 360.0 - 180.0) < 10.0
+    assert through.sum() > 10  # the gap is 20 degrees wide
+    met = (seen_m < model(name).max_m).mean()
+    assert met < 0.02  # directions are rounded and interpolated
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -137,12 +137,12 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         (DOUBTED, {}, "stopped: position wanders", ""),
         (DOUBTED, ROLLS, "stopping: position wanders", ""),
         (DONE, {}, "done", ""),
-        (DONE, {"parting": STILL_ARMED}, "done", "the rover is still armed, in HOLD"),
+        (DONE, {"parting": STILL_ARMED}, "done", "the rover was left armed, in HOLD"),
         (
             BY_USER,
             {"shed": TargetStatus.PENDING, "parting": STILL_ARMED},
             "stopped by the user: 1 of 2 targets reached",
-            "shed: not reached; the rover is still armed, in HOLD",
+            "shed: not reached; the rover was left armed, in HOLD",
         ),
         (DONE, SHED, "ended: 1 of 2 targets reached", "shed: unreachable"),
         (

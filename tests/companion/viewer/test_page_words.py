@@ -361,7 +361,7 @@ def test_in_the_end_it_says_what_the_run_came_to_and_how_the_rover_is_left(tmp_p
     script = """
 const { Headline } = await import("./headline.js");
 const headline = new Headline();
-const armed = "the rover is still armed, in HOLD";
+const armed = "the rover was left armed, in HOLD";
 const moments = [
   { statuses: ["reached", "reached"], line: "done", why: armed },
   { statuses: ["reached", "reached"], line: "done", why: "" },
@@ -371,7 +371,7 @@ const show = (one) => (headline.show({ live: true }, { state: "ended", t: 1, ...
 tell(moments.map(show));
 """
     assert ran(tmp_path, DOCUMENT + script) == [
-        "2 of 2 targets reached · The rover is still armed, in HOLD",
+        "2 of 2 targets reached · The rover was left armed, in HOLD",
         "2 of 2 targets reached",
         "B: not reached",
     ]
