@@ -283,14 +283,17 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: Problems) -> 
 
 
 def _sooner_or_later(later: MotionProblem, view: LocalView) -> Problems:
-    """The problem of a rover that obeys as late as may be; over a late link also that of one that obeys soon.
+    """The problem of a rover that obeys as late as may be; over a late link, and without a guard, also that of one that
+    obeys soon.
 
-    There the turns of half a second are under way, and if they come sooner they lead elsewhere.
+    A turn that is under way leads elsewhere if it ends sooner: over a late link that is half a second of turning, and
+    in the three seconds without a guard a few degrees become half a metre.
     """
-    if view.soonest_s >= view.following.dead_s:
+    if view.soonest_s >= view.following.dead_s and _alone_s(view) == 0.0:
         return (later,)
-    soonest = math.floor(view.soonest_s * (1.0 - view.following.off_model) / ALONE_STEP_S + 1e-6)
-    return later, later._replace(pending=_pending(view, soonest, ALONE_STEP_S))
+    soonest_s = min(view.soonest_s, view.following.dead_s)
+    steps = math.floor(soonest_s * (1.0 - view.following.off_model) / ALONE_STEP_S + 1e-6)
+    return later, later._replace(pending=_pending(view, steps, ALONE_STEP_S))
 
 
 def _latest(view: LocalView) -> int:

@@ -346,6 +346,26 @@ def test_over_a_late_link_what_is_told_is_safe_whether_it_is_obeyed_late_or_soon
     assert np.all(admitted[1] <= admitted[0]) and admitted[1].sum() < 0.7 * admitted[0].sum()
 
 
+def test_without_a_guard_what_is_told_is_safe_whether_it_is_obeyed_late_or_soon(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A turn away from a wall has just been told off; if it ends sooner, three seconds later the wall is nearer."""
+    evidence = ground()
+    for north_m in np.arange(0.0, 20.0, evidence.evidence_m):
+        wall(evidence, float(north_m), 8.6, 9.1)
+    told = tuple(ToldVelocity(0.05 * step, 1.0, 0.9 if step < 12 else -0.2) for step in range(-30, 17))
+    at = view(evidence, Pose(3.0, 10.0, 0.0, 0.8), 1.0, STRICT)
+    at = replace(at, following=Following(dead_s=0.275, off_model=0.28), yaw_rate_rad_s=0.5, lately=told)
+    admitted = []
+    for problems in (motion_controller._sooner_or_later, lambda later, view: (later,)):
+        monkeypatch.setattr(motion_controller, "_sooner_or_later", problems)
+        leads = controller()
+        leads.follow(PATH, at)
+        assert leads.choice is not None
+        admitted.append(leads.choice.problem.admitted_m_s)
+    assert np.all(admitted[0] <= admitted[1]) and admitted[0].sum() < 0.9 * admitted[1].sum()
+
+
 def test_it_foresees_that_it_backs_off() -> None:
     """Before a wall, with the path behind it, it begins tail first or turns: not on towards the wall."""
     evidence = ground()
