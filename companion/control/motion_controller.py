@@ -63,7 +63,8 @@ BRAKE_TURNS = np.array([0.0, -0.5, 0.5, -1.0, 1.0])
 ENOUGH_M = 0.1
 """With so much room it does not turn while it brakes."""
 STRAIGHTER_M = 0.03
-"""Nor where turning keeps hardly more room than that: no model of a rover is that exact."""
+"""Nor where turning keeps less room than this and hardly more than braking straight on: no model of a rover is that
+exact."""
 STANDS_M_S = 0.05
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
 """Turn rates for which the fastest speed is looked for that may be told, as shares of the fastest."""
@@ -222,7 +223,8 @@ class MotionController:
         """The way to brake that keeps most room, straight on where there is enough."""
         now_s, fastest_rad_s = self._time_s, worst[0].model.turn_fastest_rad_s
         spares_m = _braking_spares_m(BRAKE_TURNS * fastest_rad_s, view, worst)
-        best = float(BRAKE_TURNS[np.argmax(np.minimum(spares_m, ENOUGH_M) - STRAIGHTER_M * (BRAKE_TURNS != 0.0))])
+        doubtful = (BRAKE_TURNS != 0.0) & (spares_m < STRAIGHTER_M)
+        best = float(BRAKE_TURNS[np.argmax(np.minimum(spares_m, ENOUGH_M) - STRAIGHTER_M * doubtful)])
         rolls = abs(worst[0].start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
 

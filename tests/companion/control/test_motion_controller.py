@@ -312,16 +312,20 @@ def test_it_foresees_no_better_braking_than_of_a_rover_that_is_told_to_stand() -
     assert np.all(rolled_m[:8] >= braked_m(1.9, times_s, at.settings.guidance)[:8] - 0.15)
 
 
-@pytest.mark.parametrize(("turned_m", "turns"), [(-0.127, False), (-0.1, True)])
+@pytest.mark.parametrize(
+    ("straight_m", "turned_m", "turns"),
+    [(-0.143, -0.127, False), (-0.143, -0.1, True), (0.01, 0.025, False), (0.02, 0.045, True)],
+)
 def test_it_turns_while_it_brakes_only_for_clearly_more_room(
-    monkeypatch: pytest.MonkeyPatch, turned_m: float, turns: bool
+    monkeypatch: pytest.MonkeyPatch, straight_m: float, turned_m: float, turns: bool
 ) -> None:
+    """Where turning keeps room enough, any more of it is worth a turn: in a gap it must go on round its edge."""
     evidence = ground()
     wall(evidence, 4.0, 8.0, 12.0)
     monkeypatch.setattr(
         motion_controller,
         "_braking_spares_m",
-        lambda turns_rad_s, *_: np.where(turns_rad_s > 0.0, turned_m, -0.143),
+        lambda turns_rad_s, *_: np.where(turns_rad_s > 0.0, turned_m, straight_m),
     )
     leads = controller()
     command = leads.follow(PATH, view(evidence, Pose(3.0, 10.0, 0.0, 0.0), 1.9))
