@@ -202,7 +202,7 @@ class YdlidarEncoder:
         return answer
 
     def aside_deg(self, range_m: Floats) -> Floats:
-        """The manual's formula: the laser's ray begins 21.8 mm beside the receiver, and crosses its axis 155.3 mm ahead.
+        """The manual's formula: the laser's ray begins 21.8 mm beside the receiver and crosses its axis 155.3 mm ahead.
 
         Where it meets nothing it ends far away, where the formula tends to -8 degrees.
         """
