@@ -408,6 +408,7 @@ def test_a_report_is_walked_through_by_clicks(report_file: Path) -> None:
         report.click_at("canvas.marks", 200, 5)
         report.until(lambda: time_of() != at_row)
         report.run(SEEK, 0.6)  # straight on so far
+        report.until(lambda: report.run(MIDDLE, FAST)[1] is not None)  # drawn in the next frame
         _, right, down = report.run(MIDDLE, FAST)
         before = time_of()
         report.click_at("canvas", round(right), round(down))
