@@ -206,6 +206,7 @@ def _summary(seen: Survey) -> dict[str, object]:
         "system": seen.system if seen.rover_heard else None,
         "version": None if seen.version is None else ".".join(map(str, seen.version)),
         "gps_fix": None if seen.vehicle.gps is None else seen.vehicle.gps.fix.text,
+        "guard_waits_s": None if seen.vehicle.guard is None else seen.vehicle.guard.waits_s,
         "parameters": dict(seen.parameters),
         "sensors": [asdict(one) for one in seen.sources],
     }
@@ -266,6 +267,9 @@ def _show(
         if known := {name: seen.parameters[name] for name in names if name in seen.parameters}:
             limits = ", ".join(f"{name} {value:g}" for name, value in known.items())
             console.print(f"limits: {limits}", soft_wrap=True, markup=False)
+        if (guard := seen.vehicle.guard) is not None:
+            line = f"guard: on the autopilot, sets HOLD {guard.waits_s:g} s after the companion's last packet"
+            console.print(line, soft_wrap=True, markup=False, highlight=False)
         fix = "not told" if seen.vehicle.gps is None else seen.vehicle.gps.fix.text
         console.print(f"GPS fix: {fix}; safety.gps_fix asks for {gps_fix}", soft_wrap=True, highlight=False)
         if estimate is not None and estimate.known > 0.0:

@@ -16,7 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
-from companion.cli.doctor import _looked_at, mission_line, of_mission
+from companion.cli.doctor import _looked_at, _summary, mission_line, of_mission
 from companion.control.following import Following
 from companion.control.model_estimate import ModelEstimate
 from companion.core.frames import LocalFrame, NedPoint
@@ -125,6 +125,7 @@ def test_a_rover_that_is_well(tmp_path: Path) -> None:
     assert case.findings() == {"gcs-failsafe": Level.NOTE}
     assert case.result.version == (4, 7, 0)
     assert set(case.result.parameters) == set(PARAMETERS) - {"SYSID_MYGCS"}
+    assert _summary(case.result)["guard_waits_s"] == 0.3
     assert {m.command for m in case.sent if m.get_type() == "COMMAND_LONG"} == HARMLESS
 
 
