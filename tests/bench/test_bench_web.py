@@ -59,8 +59,8 @@ PARTS = (
 )
 """Parts of a drive, and how many times as late as without a page the 99th percentile of its ticks may be. The browsers
 start on the same processors, which is not what a page costs; and the short parts have few ticks."""
-TOLD_LIMIT_MS = 10.0
-"""What telling the page may take of the time between two ticks: a fifth."""
+TOLD_LIMIT_MS = 5.0
+"""What telling the page may take of the time between two ticks: a tenth."""
 MEMORY_LIMIT_MB = 60.0
 CPU_LIMIT = 0.025
 """Of a core of this machine: a tenth of one that is four times as slow, as on a small computer."""
@@ -135,7 +135,7 @@ def crowd(port: int, readers: int) -> Iterator[subprocess.Popen[str]]:
 
 
 def driven(run: Drive, viewer: LiveViewer | None, half_way: Callable[[], None] = lambda: None) -> np.ndarray:
-    """The ticks while all processes start and every browser is told the map (``STARTS``), and from then on."""
+    """The ticks while all processes start and every browser is told the map, and from then on."""
     return np.hstack((ticks_of(run, viewer, SETTLED_S, lambda: None), ticks_of(run, viewer, DRIVEN_S, half_way)))
 
 
