@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.control.following import Following, turn_gains
+from companion.control.following import GUARDED_S, Following, turn_gains
 from companion.control.local_view import LocalView
 from companion.control.told import in_force
 from companion.mapping.evidence_map import EvidenceMap
@@ -84,18 +84,18 @@ class Rasters(NamedTuple):
 
 
 def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] | None:
-    """The ways on which it may end, as it turns as told, less or more; None if it would never stand."""
+    """The ways on which it may end, as it turns as told, less or more, and obeys late or soon; None if it would never
+    stand."""
     follows, lasts_s = view.following, view.settings.guidance.velocity_lasts_s
-    latest_s = _latest_s(follows)
-    tells = _tells(setpoint, view, latest_s)
     start = np.array((*_from_corner(view), view.pose.heading_rad, view.shoots_m_s, view.yaw_rate_rad_s))
-    ends_s = latest_s + lasts_s
     ways = []
-    for gain in turn_gains(follows, lasts_s):
-        places, stands = way_of(start, tells, ends_s, follows.turn_gain * gain, _worst(follows))
-        if not stands:
-            return None
-        ways.append(places)
+    for obeys_s in _obeys_s(view):
+        tells = _tells(setpoint, view, obeys_s)
+        for gain in turn_gains(follows, lasts_s):
+            places, stands = way_of(start, tells, obeys_s + lasts_s, follows.turn_gain * gain, _worst(follows))
+            if not stands:
+                return None
+            ways.append(places)
     return ways
 
 
@@ -138,24 +138,31 @@ def _worst(follows: Following) -> Rover:
     return Rover(follows.gains_most_m_s2, brakes_m_s2, follows.turn_acceleration_rad_s2)
 
 
-def _latest_s(follows: Following) -> float:
-    """When a command has its effect at the latest, in whole steps: it lasts on from there, so later leads farther."""
-    return math.ceil(follows.dead_s * (1.0 + follows.off_model) / STEP_S - 1e-6) * STEP_S
+def _obeys_s(view: LocalView) -> tuple[float, ...]:
+    """When a command has its effect, in whole steps: at the latest, and over a late link or without a guard also at the
+    soonest. It lasts on from there, so later leads farther; but a turn that is under way may end sooner.
+    """
+    follows = view.following
+    latest_s = math.ceil(follows.dead_s * (1.0 + follows.off_model) / STEP_S - 1e-6) * STEP_S
+    if view.soonest_s >= follows.dead_s and view.settings.guidance.velocity_lasts_s <= GUARDED_S:
+        return (latest_s,)
+    soonest_s = min(view.soonest_s, follows.dead_s) * (1.0 - follows.off_model)
+    return latest_s, math.floor(soonest_s / STEP_S + 1e-6) * STEP_S
 
 
-def _tells(setpoint: GuidedVelocity, view: LocalView, latest_s: float) -> NDArray[np.float64]:
+def _tells(setpoint: GuidedVelocity, view: LocalView, obeys_s: float) -> NDArray[np.float64]:
     """From when on which speed and turn rate have their effect, one a row; the last one is the setpoint's.
 
     Where no velocity was told, the rover goes on as it does; a position tells it to drive on.
     """
     now_s, on_m_s = view.pose.time_s, view.forward_m_s
-    if view.by_position(now_s - latest_s):
+    if view.by_position(now_s - obeys_s):
         on_m_s = view.rover.cruise_speed_m_s
-    first = in_force(view.lately, now_s - latest_s)
+    first = in_force(view.lately, now_s - obeys_s)
     rows = [(-math.inf, on_m_s, view.yaw_rate_rad_s) if first is None else (-math.inf, *first[1:])]
-    later = (one for one in view.lately if one.time_s > now_s - latest_s)
-    rows += [(one.time_s - now_s + latest_s, one.speed_m_s, one.turn_rad_s) for one in later]
-    return np.array([*rows, (latest_s, setpoint.forward_m_s, setpoint.yaw_rate_rad_s)])
+    later = (one for one in view.lately if one.time_s > now_s - obeys_s)
+    rows += [(one.time_s - now_s + obeys_s, one.speed_m_s, one.turn_rad_s) for one in later]
+    return np.array([*rows, (obeys_s, setpoint.forward_m_s, setpoint.yaw_rate_rad_s)])
 
 
 @njit(cache=True, nogil=True)
