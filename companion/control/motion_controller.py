@@ -56,9 +56,6 @@ WEIGHTS = Weights(
     late=0.4,
     in_line=2.0,
 )
-STRICT_MARGIN_M = 0.01
-"""Without a guard: a rover that keeps so much more room for each m/s keeps less where it hardly moves. A gap of its
-width and 0.2 m leaves it hardly 5 cm on each side, as the map has cells of 5 cm."""
 SHARES = (1.0, 0.7, 0.4, 0.15)
 """Of the speed that was planned, tried in turn until the rover may be left alone with it."""
 BRAKE_TURNS = np.array([0.0, -0.5, 0.5, -1.0, 1.0])
@@ -75,6 +72,8 @@ NONE_ADMITTED = np.zeros((len(TURN_SHARES), 2))
 FASTER_S, BLUR_S, MOST_BLUR_RAD = 0.02, 1.15, math.radians(10.0)
 """Left alone, the rover keeps so much more room for each m/s; more where a reading speaks for a wide angle: how far to
 the side something ends that is as far away as the rover needs to stop is known only to within half of that."""
+LONGER_BLUR = 0.5
+"""Half of that angle, for each second longer than with a guard that a velocity lasts: so much farther away it is."""
 DRIFT_SHARE = 0.05
 """For each second longer than with a guard that a velocity lasts, a rover that is left alone keeps so much more room
 for each m/s: meanwhile its position, by which the map was made, drifts, and small errors grow."""
@@ -209,7 +208,7 @@ class MotionController:
         start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
         pending = _pending(view, round(model.dead_s / STEP_S), STEP_S)
         return MotionProblem(
-            start, pending, self._window.ground, self._body, model, _weights(view), NONE_ADMITTED, HORIZON_S, STEP_S
+            start, pending, self._window.ground, self._body, model, WEIGHTS, NONE_ADMITTED, HORIZON_S, STEP_S
         )
 
     def _safe(self, wanted: NDArray[np.float64], view: LocalView, worst: Problems) -> ToldVelocity:
@@ -253,14 +252,9 @@ def _admitted(view: LocalView, worst: Problems) -> NDArray[np.float64]:
     lasts_s = view.settings.guidance.velocity_lasts_s
     gains = turn_gains(view.following, lasts_s)
     admitted: NDArray[np.float64] = np.minimum.reduce(
-        [admitted_speeds(turns_rad_s, lasts_s, gains, one.weights.margin_m, _faster_s(view), one) for one in worst]
+        [admitted_speeds(turns_rad_s, lasts_s, gains, WEIGHTS.margin_m, _faster_s(view), one) for one in worst]
     )
     return admitted
-
-
-def _weights(view: LocalView) -> Weights:
-    """By the rule in force."""
-    return WEIGHTS if _alone_s(view) == 0.0 else WEIGHTS._replace(margin_m=STRICT_MARGIN_M)
 
 
 def _alone_s(view: LocalView) -> float:
@@ -270,7 +264,8 @@ def _alone_s(view: LocalView) -> float:
 
 def _faster_s(view: LocalView) -> float:
     """Room for each m/s."""
-    return max(FASTER_S, BLUR_S * min(view.rover.beam_rad, MOST_BLUR_RAD)) + DRIFT_SHARE * _alone_s(view)
+    alone_s, beam_rad = _alone_s(view), min(view.rover.beam_rad, MOST_BLUR_RAD)
+    return max(FASTER_S, (BLUR_S + LONGER_BLUR * alone_s) * beam_rad) + DRIFT_SHARE * alone_s
 
 
 def _braking_spares_m(turns_rad_s: NDArray[np.float64], view: LocalView, worst: Problems) -> NDArray[np.float64]:
@@ -285,11 +280,10 @@ def _braking_spares_m(turns_rad_s: NDArray[np.float64], view: LocalView, worst: 
 
 def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: Problems) -> bool:
     """Whether this may be the last command, however the rover turns."""
-    lasts_s, faster_s = view.settings.guidance.velocity_lasts_s, _faster_s(view)
+    lasts_s, margin_m, faster_s = view.settings.guidance.velocity_lasts_s, WEIGHTS.margin_m, _faster_s(view)
     gains = turn_gains(view.following, lasts_s)
     return all(
-        always_may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gains, one.weights.margin_m, faster_s, one)
-        for one in worst
+        always_may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gains, margin_m, faster_s, one) for one in worst
     )
 
 
@@ -302,14 +296,18 @@ def _sooner_or_later(later: MotionProblem, view: LocalView) -> Problems:
     """
     if view.soonest_s >= view.following.dead_s and _alone_s(view) == 0.0:
         return (later,)
-    soonest_s = min(view.soonest_s, view.following.dead_s)
-    steps = math.floor(soonest_s * (1.0 - view.following.off_model) / ALONE_STEP_S + 1e-6)
-    return later, later._replace(pending=_pending(view, steps, ALONE_STEP_S))
+    return later, later._replace(pending=_pending(view, _soonest(view), ALONE_STEP_S))
 
 
 def _latest(view: LocalView) -> int:
     """After how many steps a command has its effect at the latest."""
     return math.ceil(view.following.dead_s * (1.0 + view.following.off_model) / ALONE_STEP_S - 1e-6)
+
+
+def _soonest(view: LocalView) -> int:
+    """After how many steps a command has its effect at the soonest."""
+    soonest_s = min(view.soonest_s, view.following.dead_s)
+    return math.floor(soonest_s * (1.0 - view.following.off_model) / ALONE_STEP_S + 1e-6)
 
 
 def _pending(view: LocalView, steps: int, step_s: float) -> NDArray[np.float64]:

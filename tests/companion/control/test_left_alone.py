@@ -16,7 +16,7 @@ from shapely import affinity
 from companion.control.following import turn_gains
 from companion.control.left_alone import Met, first_met, once_turned_back, ways_left_alone
 from companion.control.local_view import LocalView
-from companion.control.motion_controller import ALONE_STEP_S, _latest, _pending, rover_model, worst_model
+from companion.control.motion_controller import ALONE_STEP_S, _latest, _pending, _soonest, rover_model, worst_model
 from companion.control.motion_kernels import moved
 from companion.control.setpoint_check import fault_of
 from companion.control.told import ToldVelocity
@@ -330,11 +330,11 @@ def test_it_leads_where_the_planning_thinks_though_reckoned_apart(
     )
     moment = replace(moment, following=moment.following._replace(dead_s=dead_s))
     model = worst_model(rover_model(moment), moment.following)
-    pending = _pending(moment, _latest(moment), ALONE_STEP_S)
     ways = ways_left_alone(GuidedVelocity(*told), moment)
     assert ways is not None
     gains = turn_gains(moment.following, moment.settings.guidance.velocity_lasts_s)
-    for way, gain in zip(ways[: len(gains)], gains, strict=True):  # of a rover that obeys late
+    each = [(_pending(moment, steps(moment), ALONE_STEP_S), gain) for steps in (_latest, _soonest) for gain in gains]
+    for way, (pending, gain) in zip(ways, each, strict=True):
         state, planned = (MIDDLE, MIDDLE, 0.0, speed_m_s, turn_rad_s), []
         for told_m_s, told_rad_s in [*pending, *[told] * 60, *[(0.0, 0.0)] * 200]:
             state = moved(state, told_m_s, gain * told_rad_s, model, ALONE_STEP_S)

@@ -17,7 +17,6 @@ from companion.control.motion_controller import (
     MotionController,
     _faster_s,
     _latest,
-    _weights,
     rover_model,
 )
 from companion.control.motion_kernels import clearance_m, moved
@@ -400,17 +399,15 @@ def test_no_motion_is_faster_or_turns_faster_than_the_autopilot_lets_it() -> Non
     assert held.fastest_m_s == 1.2 and held.turn_fastest_rad_s == pytest.approx(math.radians(30.0))
 
 
-def test_without_a_guard_a_rover_keeps_more_room_the_faster_it_is_and_more_of_it_in_turns() -> None:
-    """Three seconds of a turn: small errors add up, and so does the drift of the position. Creeping it keeps less: else
-    a gap of its width and 0.2 m would be closed to it."""
-    pose = Pose(3.0, 10.0, 0.0, 1.0)
-    guarded, strict = (replace(view(ground(), pose, 0.5, one), following=KNOWN) for one in (GUARDED, STRICT))
+def test_without_a_guard_a_rover_keeps_more_room_and_more_of_it_in_turns() -> None:
+    """Three seconds of a turn: small errors add up, and so does the drift of the position; and what is farther away is
+    known less well where a reading speaks for a wide angle."""
+    strict = replace(view(ground(), Pose(3.0, 10.0, 0.0, 1.0), 0.5, STRICT), following=KNOWN)
     short, long = (turn_gains(KNOWN, one.guidance.velocity_lasts_s) for one in (GUARDED, STRICT))
     assert max(long) == pytest.approx(max(short) + 0.1) and min(long) == pytest.approx(min(short) - 0.1)
-    assert _faster_s(strict) == pytest.approx(_faster_s(guarded) + 0.1)
-    creeps_m_s = 0.1
-    rooms_m = [_weights(one).margin_m + creeps_m_s * _faster_s(one) for one in (guarded, strict)]
-    assert 0.0 < rooms_m[1] < rooms_m[0]
+    fine, wide = (replace(strict, rover=replace(strict.rover, beam_rad=math.radians(deg))) for deg in (0.5, 5.0))
+    assert _faster_s(fine) == pytest.approx(_faster_s(replace(fine, settings=GUARDED)) + 0.1)
+    assert _faster_s(wide) == pytest.approx(_faster_s(replace(wide, settings=GUARDED)) + 0.1 + math.radians(5.0))
 
 
 def test_on_ground_that_drags_it_goes_slower_where_it_could_not_stop_if_that_ground_ended() -> None:
