@@ -89,6 +89,10 @@ class ArcController:
         """It follows the line ahead."""
         return None
 
+    def turned_stops(self, view: LocalView, times_s: Points) -> tuple[()]:
+        """Its wheels stay as they are while it stops."""
+        return ()
+
     def follow(self, path: ReferencePath, view: LocalView) -> ControlCommand:
         """The command for this moment: on with the manoeuvre, on along the path, or stop."""
         rolling = self._rolling(view)

@@ -1,15 +1,17 @@
 """Collision avoidance (yielding): before a command is used, the next seconds are played through with all that moves.
 
-Several options are played through: go on, go on a little and then stop, stop at once, turn and move aside, back
-off, drive off on an arc. The first that keeps its distance is taken; if none does, the one that leaves the most
-room. If all would touch something, those count that go well for longest: the rover goes on to move aside if it does so
-already, else it takes the one with which the two would meet at the lowest speed.
+Several options are played through: go on, go on a little and then stop, stop at once, turn while it stops, turn and
+move aside, back off, drive off on an arc. The first that keeps its distance is taken; if none does, the one that leaves
+the most room. If all would touch something, those count that go well for longest: the rover goes on to move aside if it
+does so already, else it takes the one with which the two would meet at the lowest speed.
 
 The rover stops before the way of others, since going on is allowed only while there still is somewhere to stop; and it
 waits there until going on is safe again. Once it stops for something it goes on only for good: else it would drive
-along beside that, always about to pass in front of it. Of positions that are as good the first is told with which a
-rover that is left alone is not met, if there is one. Each option says what the autopilot would be told and where the
-rover would then be at each moment; the ground there must be clear and seen.
+along beside that, always about to pass in front of it. While it still rolls it goes on only where that keeps its
+distance: what is seen to move is not known exactly, and a rover that brakes and goes on in turn does neither in time.
+Of positions that are as good the first is told with which a rover that is left alone is not met, if there is one. Each
+option says what the autopilot would be told and where the rover would then be at each moment; the ground there must be
+clear and seen.
 
 Nouns: collision avoidance, yielding.
 """
@@ -17,7 +19,7 @@ Nouns: collision avoidance, yielding.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -49,6 +51,8 @@ from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
 Foresees = Callable[[Points], Points | None]
 """Where the rover will be at these moments, seconds from now on."""
+TurnedStops = Callable[[Points], Iterable[tuple[ControlCommand, Points]]]
+"""Ways to stop while it turns that the ground allows, and where the rover then is at these moments."""
 HALF_MARGIN = 0.5
 """Going on for good with half the margin, or stopping, is better than leaving the path. Not going on for a little: a
 rover that brakes would spend the rest of the margin on it, and brake late."""
@@ -132,12 +136,13 @@ def avoided(
     stops: bool = False,
     backwards: bool = False,
     foresees: Foresees | None = None,
+    turned_stops: TurnedStops | None = None,
 ) -> Option:
     """What to do because of what moves, when the controller says ``command``; that command if nothing comes across.
 
     ``line``: what the rover is led along. ``aside_rad``: the bearing to which it moves aside already; it keeps to that.
     ``stops``: it stops already. ``backwards``: it rolls tail first. ``foresees``: where the rover will be with that
-    command, if it is known better than that it follows the line.
+    command, if it is known better than that it follows the line. ``turned_stops``: how else it may stop.
     """
     times_s = np.arange(0.0, view.settings.traffic.look_s + 1e-9, PERIOD_S)
     outlook = Outlook(view, times_s, backwards, stops)
@@ -160,13 +165,25 @@ def avoided(
         if good:
             positions = (option for option in good if isinstance(option.command.setpoint, GuidedPosition))
             return next((one for one in positions if _may_be_the_last(one.command, view, discs)), good[0])
+    turned = [Option(*way) for way in turned_stops(times_s)] if turned_stops is not None else []
+    rooms_m = [room_m(option, HALF_MARGIN) for option in turned]
+    if rooms_m and max(rooms_m) >= 0.0:
+        return turned[int(np.argmax(rooms_m))]
+    options += turned
     turns_on_the_spot = view.rover.turning_radius_m == 0.0
     for option in _out_of_the_way(outlook, moving, aside_rad) if turns_on_the_spot else _on_arcs(outlook):
         if room_m(option, HALF_MARGIN) >= 0.0:
             return option
         options.append(option)
+    if stops and view.speed_m_s > view.settings.guidance.roll_out_m_s:
+        options = [option for option in options if option.yields]
+    return _least_bad(options, outlook, discs, aside_rad)
 
-    ends = [(option, first_near(_middles(option.places, view), discs, times_s, NEAR_M)) for option in options]
+
+def _least_bad(options: list[Option], outlook: Outlook, discs: Points, aside_rad: float | None) -> Option:
+    """Of options that all come too near: the one with most room, or with which the two meet late and slowly."""
+    view = outlook.view
+    ends = [(option, first_near(_middles(option.places, view), discs, outlook.times_s, NEAR_M)) for option in options]
     if any(near.least_m >= 0.0 for _, near in ends):
         return max(ends, key=lambda one: one[1].least_m)[0]
     latest_s = max(near.first_s for _, near in ends)
@@ -215,11 +232,12 @@ class CollisionAvoidance:
         *,
         backwards: bool,
         foresees: Foresees | None = None,
+        turned_stops: TurnedStops | None = None,
     ) -> Option:
         """What to do, as ``avoided`` says."""
         option = avoided(
-            command, line, view, moving,
-            aside_rad=self._aside_rad, stops=self._stops, backwards=backwards, foresees=foresees,
+            command, line, view, moving, aside_rad=self._aside_rad, stops=self._stops, backwards=backwards,
+            foresees=foresees, turned_stops=turned_stops,
         )  # fmt: skip
         self._aside_rad = option.aside_rad
         self._stops = option.yields and option.command.purpose is Purpose.BRAKE

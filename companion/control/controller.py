@@ -5,6 +5,7 @@ Nouns: controller, control command, purpose.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -68,6 +69,13 @@ class Controller(Protocol):
         """Where the rover will be at these moments from now on, if nothing comes across; one row each, north and east.
 
         None: it follows the line ahead as it is told.
+        """
+        ...
+
+    def turned_stops(self, view: LocalView, times_s: Points) -> Iterable[tuple[ControlCommand, Points]]:
+        """Ways to stop while the rover turns that the ground allows: what to tell it, and where it then is, as above.
+
+        Of the moment in which it was led last.
         """
         ...
 

@@ -10,6 +10,7 @@ Nouns: motion controller.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -119,6 +120,7 @@ class MotionController:
         """Where it was first led on the map as it is."""
         self._came_m = 0.0
         """So far it has rolled forwards since."""
+        self._worst: Problems = ()
         self.choice: MotionChoice | None = None
         """The last one."""
         self.backwards = False
@@ -129,27 +131,43 @@ class MotionController:
         return path
 
     def foreseen(self, path: ReferencePath, view: LocalView, times_s: Points) -> Points | None:
-        """The motion that was chosen, as told, and then on along the path; None while a position leads along it.
-
-        It brakes no better than a rover that is told to stand is taken to: else going on would seem to end sooner.
-        """
+        """The motion that was chosen, as told, and then on along the path; None while a position leads along it."""
         if self.choice is None or self.choice.time_s != view.pose.time_s or self.choice.ahead is not None:
             return None
-        motion, problem, corner = self.choice.found.motion.copy(), self.choice.problem, self.choice.corner
+        motion = self.choice.found.motion.copy()
         motion[0] = self.choice.told.speed_m_s, self.choice.told.turn_rad_s
-        brakes_m_s2 = min(problem.model.decel_m_s2, view.settings.guidance.deceleration_m_s2)
-        problem = problem._replace(model=problem.model._replace(decel_m_s2=brakes_m_s2))
-        way = way_of(motion, problem)[:, ::-1] + (corner.north_m, corner.east_m)
+        way = self._way(motion, view)
         last_s = STEP_S * (len(way) - 1)
-        moves_s = np.minimum(times_s, last_s)
-        at_s = np.arange(len(way)) * STEP_S
-        places = np.column_stack([np.interp(moves_s, at_s, way[:, axis]) for axis in range(2)])
+        places = _at_moments(way, times_s)
         ahead = path.points[path.progress :]
         on = np.vstack((way[-1], ahead[int(np.argmin(((ahead - way[-1]) ** 2).sum(axis=1))) + 1 :]))
         reached_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(on, axis=0).T))))
         along_m = (times_s - last_s) * view.rover.cruise_speed_m_s
         further = np.column_stack([np.interp(along_m, reached_m, on[:, axis]) for axis in range(2)])
         return np.where((times_s > last_s)[:, None], further, places)
+
+    def turned_stops(self, view: LocalView, times_s: Points) -> Iterator[tuple[ControlCommand, Points]]:
+        """See ``Controller``: those that keep clear however much the rover turns."""
+        if self.choice is None or self.choice.time_s != view.pose.time_s:
+            return
+        turns_rad_s = BRAKE_TURNS[BRAKE_TURNS != 0.0] * self.choice.problem.model.turn_fastest_rad_s
+        spares_m = _braking_spares_m(turns_rad_s, view, self._worst)
+        for turn_rad_s in turns_rad_s[spares_m >= STRAIGHTER_M]:
+            motion = np.tile((0.0, turn_rad_s), (len(self.choice.found.motion), 1))
+            command = ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, float(turn_rad_s)), 0.0)
+            yield command, _at_moments(self._way(motion, view), times_s)
+
+    def _way(self, motion: NDArray[np.float64], view: LocalView) -> Points:
+        """Where a motion leads, every ``STEP_S``.
+
+        It brakes no better than a rover that is told to stand is taken to: else going on would seem to end sooner.
+        """
+        assert self.choice is not None
+        problem, corner = self.choice.problem, self.choice.corner
+        brakes_m_s2 = min(problem.model.decel_m_s2, view.settings.guidance.deceleration_m_s2)
+        problem = problem._replace(model=problem.model._replace(decel_m_s2=brakes_m_s2))
+        places: Points = way_of(motion, problem)[:, ::-1] + (corner.north_m, corner.east_m)
+        return places
 
     def reset(self) -> None:
         """The path is void, and what was planned along it."""
@@ -171,7 +189,7 @@ class MotionController:
             pending=_pending(view, _latest(view), ALONE_STEP_S),
             step_s=ALONE_STEP_S,
         )
-        worst = _sooner_or_later(later, view)
+        worst = self._worst = _sooner_or_later(later, view)
         problem = problem._replace(admitted_m_s=_admitted(view, worst))
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
             return stop_for(Purpose.BLOCKED)
@@ -229,6 +247,12 @@ class MotionController:
         best = float(BRAKE_TURNS[np.argmax(np.minimum(spares_m, ENOUGH_M) - STRAIGHTER_M * doubtful)])
         rolls = abs(worst[0].start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
+
+
+def _at_moments(way: Points, times_s: Points) -> Points:
+    """Where the rover is at these moments on a way with a place every ``STEP_S``; at its end afterwards."""
+    at_s = np.arange(len(way)) * STEP_S
+    return np.column_stack([np.interp(times_s, at_s, way[:, axis]) for axis in range(2)])
 
 
 def _stops_at(view: LocalView, model: RoverModel) -> NedPoint:

@@ -110,6 +110,10 @@ class PointController:
         """It follows the line ahead."""
         return None
 
+    def turned_stops(self, view: LocalView, times_s: Points) -> tuple[()]:
+        """It is led by positions, and stops straight on."""
+        return ()
+
     def reset(self) -> None:
         """It knows no manoeuvres; a look outlasts a change of path."""
 

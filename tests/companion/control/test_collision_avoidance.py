@@ -18,7 +18,7 @@ from companion.control.collision_avoidance import (
 )
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
-from companion.control.motion_prediction import Points
+from companion.control.motion_prediction import Points, braked_m, moved_on_arc
 from companion.control.reference_path import ReferencePath
 from companion.control.setpoint_check import fault_of
 from companion.core.footprint import Footprint
@@ -199,6 +199,42 @@ def test_where_every_way_would_touch_it_brakes_and_does_not_waver(seed: int) -> 
         pace_m_s, drift_m_s = chance.uniform(0.8, 1.1), chance.normal(0.0, 0.1)
         walker = Moving("m", 100.0, NedPoint(22.9, 17.9), drift_m_s, pace_m_s, 0.65)
         assert made(walker, 1.87).command.setpoint == GuidedVelocity(0.0, 0.0)
+
+
+def drives_on(times_s: Points) -> Points:
+    return np.column_stack((HERE.north_m + 1.9 * times_s, np.full(len(times_s), HERE.east_m)))
+
+
+def test_while_it_brakes_it_does_not_go_on_because_it_might_just_pass() -> None:
+    """A walker's pace is known to 0.2 m/s at best: a rover that brakes, and goes on in turn, does neither in time."""
+    on, walker = ControlCommand(Purpose.DRIVE, GuidedVelocity(2.0, 0.0), 2.0), crossing(-2.3, 0.9, 22.5)
+    walker = replace(walker, radius_m=0.65)
+    assert avoided(on, PATH, view(1.9), (walker,), foresees=drives_on).command == on
+    braking = avoided(on, PATH, view(1.9), (walker,), foresees=drives_on, stops=True)
+    assert braking.command == stop_for(Purpose.BRAKE)
+    standing = avoided(on, PATH, view(0.0), (crossing(-1.0, 0.1, 20.2),), foresees=drives_on, stops=True)
+    assert standing.command != stop_for(Purpose.BRAKE), "one that stands gets out of the way"
+
+
+def test_where_stopping_straight_on_would_touch_it_turns_off_while_it_stops() -> None:
+    """Of the ways to do so that the ground allows it takes the one with most room; it is not needed farther away."""
+    on = ControlCommand(Purpose.DRIVE, GuidedVelocity(2.0, 0.0), 2.0)
+    rates_rad_s = (-1.5, -0.7, 0.7, 1.5)
+    ways = [ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, rate), 0.0) for rate in rates_rad_s]
+
+    def turned_stops(times_s: Points) -> list[tuple[ControlCommand, Points]]:
+        rolled_m = braked_m(1.9, times_s, SETTINGS.guidance)
+        return [
+            (way, moved_on_arc(HERE, 0.0, rate / 2.0, rolled_m)) for way, rate in zip(ways, rates_rad_s, strict=True)
+        ]
+
+    def told(moving: Moving) -> ControlCommand:
+        return avoided(on, PATH, view(1.9), (moving,), foresees=drives_on, turned_stops=turned_stops).command
+
+    near, mirrored = crossing(2.1, -0.9, 22.9), crossing(-2.1, 0.9, 22.9)
+    assert (told(near), told(mirrored)) == (ways[3], ways[0])
+    assert avoided(on, PATH, view(1.9), (near,), foresees=drives_on).command not in ways
+    assert told(crossing(-3.0, 1.2)) == stop_for(Purpose.BRAKE)
 
 
 @pytest.mark.parametrize("speed_m_s", [1.0, 1.5, 1.9])

@@ -312,6 +312,29 @@ def test_it_foresees_no_better_braking_than_of_a_rover_that_is_told_to_stand() -
     assert np.all(rolled_m[:8] >= braked_m(1.9, times_s, at.settings.guidance)[:8] - 0.15)
 
 
+def test_it_knows_ways_to_stop_that_turn_off_where_the_ground_allows_them() -> None:
+    """As far as braking straight on, and on the side it turns to; not towards a wall near by, nor a moment later."""
+    free, walled, times_s = ground(), ground(), np.arange(0.0, 4.0, 0.2)
+    rows, column = slice(int(2.0 / walled.evidence_m), int(7.0 / walled.evidence_m)), int(10.4 / walled.evidence_m)
+    walled.log_odds[rows, column : column + 2] = 3.0
+    turns = {}
+    for evidence in (free, walled):
+        leads, at = controller(), view(evidence, Pose(3.0, 10.0, 0.0, 0.0), 1.5)
+        leads.follow(PATH, at)
+        ways = list(leads.turned_stops(at, times_s))
+        for command, places in ways:
+            setpoint = command.setpoint
+            assert isinstance(setpoint, GuidedVelocity) and setpoint.forward_m_s == 0.0
+            assert np.sign(places[-1, 1] - 10.0) == np.sign(setpoint.yaw_rate_rad_s)
+            rolled_m = np.hypot(*np.diff(places, axis=0).T).sum()
+            assert rolled_m == pytest.approx(braked_m(1.5, times_s, at.settings.guidance)[-1], abs=0.25)
+            assert places[-1, 0] - 3.0 < rolled_m
+        turns[evidence is walled] = {float(np.sign(places[-1, 1] - 10.0)) for _, places in ways}
+        later = replace(at, pose=replace(at.pose, time_s=0.1))
+        assert not list(leads.turned_stops(later, times_s))
+    assert turns == {False: {-1.0, 1.0}, True: {-1.0}}
+
+
 @pytest.mark.parametrize(
     ("straight_m", "turned_m", "turns"),
     [(-0.143, -0.127, False), (-0.143, -0.1, True), (0.01, 0.025, False), (0.02, 0.045, True)],

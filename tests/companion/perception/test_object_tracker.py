@@ -1,5 +1,7 @@
 """What the sensors see moving, what they do not, and how long its trail stays in the map."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from companion.core.grid import empty_grid
 from companion.core.scan import RangeScan
 from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
 from companion.perception.moving_obstacles import Moving
-from companion.perception.object_tracker import ObjectTracker
+from companion.perception.object_tracker import ObjectTracker, Sighting, Track
 from companion.settings import Settings
 from sitl.sensors.range_sensors import SUITES
 from sitl.world.movers import Mover, timed_track
@@ -119,6 +121,47 @@ def test_a_walker_on_ground_that_was_never_seen_is_noticed_in_time(suite: str, l
             if any(abs(one.east_m_s + 0.9) < 0.4 and abs(one.north_m_s) < 0.4 for one in watcher.look()):
                 ahead_m = met_m - (10.0 + 1.9 * (watcher.scans - 1) * PERIOD_S)
         assert ahead_m > least_m
+
+
+def test_four_scans_are_enough_also_where_they_do_not_come_exactly_in_time() -> None:
+    seen = tuple(Sighting(time_s, 5.0 + time_s, 3.0, 0.4, 0.0, 0.5, True) for time_s in (0.0, 0.1, 0.2, 0.2999))
+    assert Track(1, seen[:3]).estimate() is None
+    estimate = Track(1, seen).estimate()
+    assert estimate is not None and estimate[1] and estimate[0].north_m_s == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("turned_rad", "kept_s"), [(0.0, 1.0), (1.5, 3.0)])
+def test_what_is_out_of_sight_is_not_gone(turned_rad: float, kept_s: float) -> None:
+    """A thing that is not where it should be is given up soon; one at which no beam looks any more is not."""
+    evidence = new_map(empty_grid(40, 40), 0.35, SETTINGS.mapping)
+    evidence.log_odds.fill(-1.0)
+    tracker, bearings = ObjectTracker(evidence), np.radians(np.arange(-45.0, 45.0, 1.25))
+    here = Pose(10.0, 20.0, 0.0, 0.0)
+    tracker.remember(here, 8.0)
+
+    def look(time_s: float, heading_rad: float, away_m: float) -> bool:
+        range_m = np.where(np.abs(bearings) < 0.12, away_m, np.inf)
+        scan = RangeScan(time_s, bearings, range_m, 0.1, 4.5, np.radians(1.25), "test")
+        tracker.take(replace(here, heading_rad=heading_rad, time_s=time_s), 0.0, scan)
+        return bool(tracker.moving(time_s, SETTINGS.traffic))
+
+    assert [look(0.1 * i, 0.0, 4.0 - 0.05 * i) for i in range(6)][-1]
+    empty = [0.6 + 0.1 * i for i in range(40) if look(0.6 + 0.1 * i, turned_rad, np.inf)]
+    assert empty[-1] - 0.5 == pytest.approx(kept_s, abs=0.15)
+
+
+def test_of_what_has_just_come_into_view_it_is_doubted_whether_it_moves() -> None:
+    """From its second scan on, until its velocity is known; only ahead."""
+    track = timed_track([(13.0, 30.0), (13.0, 10.0)], 0.9, 0.0, repeats=False)
+    watcher = Watcher(World(np.zeros((40, 40), np.bool_), movers=(Mover("m", 0.4, track),)), "lidar-90", 1)
+    doubts, moves = [], []
+    for _ in range(120):
+        moves.append(bool(watcher.look()))
+        pose = Pose(10.0, 20.0, 0.0, (watcher.scans - 1) * PERIOD_S)
+        doubts.append(watcher.tracker.doubtful(pose))
+        assert not watcher.tracker.doubtful(replace(pose, heading_rad=np.pi))
+    first = moves.index(True)
+    assert not any(doubts[: first - 6]) and all(doubts[first - 2 : first]) and not any(doubts[first : first + 10])
 
 
 def test_the_trail_of_something_that_moves_is_soon_free_again() -> None:
