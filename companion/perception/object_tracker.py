@@ -95,6 +95,8 @@ class Sighting:
     """How wide what is seen of it is."""
     on_free_ground: bool
     """Else it only stands alone."""
+    cut: bool = False
+    """Whether a part of it is out of sight: its middle is then found otherwise, and may seem to lie elsewhere."""
 
     @property
     def found_again_m(self) -> float:
@@ -111,21 +113,27 @@ class Track:
 
     def estimate(self) -> tuple[Moving, bool] | None:
         """Its place and velocity by least squares, and whether they are significant; None if seen too briefly."""
-        time_s = np.array([one.time_s for one in self.sightings])
+        kind = self.sightings[-1].cut
+        return self._estimate(kind) or self._estimate(not kind)
+
+    def _estimate(self, cut: bool) -> tuple[Moving, bool] | None:
+        """Of the sightings of one kind alone: else a thing that is only found otherwise seems to move."""
+        sightings = [one for one in self.sightings if one.cut == cut]
+        time_s = np.array([one.time_s for one in sightings])
         if len(time_s) < LEAST_SIGHTINGS or time_s[-1] - time_s[0] < LEAST_S:
             return None
-        places = np.array([(one.north_m, one.east_m) for one in self.sightings])
+        places = np.array([(one.north_m, one.east_m) for one in sightings])
         since = time_s - time_s.mean()
         velocity = since @ places / (since @ since)
         fitted = places.mean(axis=0) + since[:, None] * velocity
         stray_m = float(np.sqrt(((places - fitted) ** 2).sum(axis=1).mean()))
         newest = NedPoint(float(fitted[-1, 0]), float(fitted[-1, 1]))
-        radius_m = max(one.radius_m for one in self.sightings) + DOUBT_M
-        blur_m = sum(one.blur_m for one in self.sightings) / len(self.sightings)
+        radius_m = max(one.radius_m for one in sightings) + DOUBT_M
+        blur_m = sum(one.blur_m for one in sightings) / len(sightings)
         error_m_s = max(stray_m, 0.03) / math.sqrt(float(since @ since))
         north_m_s, east_m_s = (float(part) for part in velocity)
         moving = Moving(f"seen {self.number}", float(time_s[-1]), newest, north_m_s, east_m_s, radius_m)
-        on_free_ground = 2 * sum(one.on_free_ground for one in self.sightings) >= len(self.sightings)
+        on_free_ground = 2 * sum(one.on_free_ground for one in sightings) >= len(sightings)
         least_m_s = max(SURE * error_m_s, 0.0 if on_free_ground else ALONE_M_S)
         return moving, stray_m <= STRAY_M + blur_m and moving.speed_m_s >= least_m_s
 
@@ -242,60 +250,74 @@ def _ends(pose: Pose, scan: RangeScan) -> tuple[Points, Points]:
 
 
 @njit(cache=True, nogil=True)
-def alone_in(beam_rad: float, range_m: Points, farthest_m: float) -> NDArray[np.int64]:
+def alone_in(beam_rad: float, range_m: Points, farthest_m: float, is_fan: bool) -> NDArray[np.int64]:
     """For each reading the number of the narrow thing, with nothing near beside it, to which it belongs; -1: none.
 
-    ``range_m``: one for each beam, in their order, ``beam_rad`` apart; inf: free, nan: nothing is known.
+    ``range_m``: one for each beam, in their order, ``beam_rad`` apart; inf: free, nan: nothing is known. What reaches
+    the edge of a fan may go on beyond; there its other side counts. The number is that of its first beam.
     """
     count = len(range_m)
     result = np.full(count, -1)
-    first = 1
+    first = 0 if is_fan else 1
     while first < count - 1:
         last = first
         while last + 1 < count and abs(range_m[last + 1] - range_m[last]) <= ALONE_DEPTH_M:
             last += 1
-        if math.isfinite(range_m[first]) and last < count - 1:
+        whole = first > 0 and last < count - 1
+        if math.isfinite(range_m[first]) and (whole or (is_fan and last - first < count - 1)):
             own = range_m[first : last + 1]
-            free = range_m[first - 1] > range_m[first] + ALONE_M and range_m[last + 1] > range_m[last] + ALONE_M
+            before = first == 0 or range_m[first - 1] > range_m[first] + ALONE_M
+            behind = last == count - 1 or range_m[last + 1] > range_m[last] + ALONE_M
             wide_m = own.min() * (last - first) * beam_rad
-            if free and wide_m <= ALONE_WIDEST_M and own.max() <= farthest_m:
+            if before and behind and wide_m <= ALONE_WIDEST_M and own.max() <= farthest_m:
                 result[first : last + 1] = first
         first = last + 1
     return result
 
 
-def _alone(scan: RangeScan) -> NDArray[np.int64]:
-    """For each reading that hit something the number of the thing that stands alone to which it belongs; -1: none."""
+def _alone(scan: RangeScan) -> tuple[NDArray[np.int64], dict[int, int]]:
+    """For each reading that hit something the number of the thing that stands alone to which it belongs; -1: none.
+
+    And on which side the edge of a fan cuts one off, by its number: 1 to the right, -1 to the left.
+    """
     bearings = np.mod(scan.bearing_rad + math.pi, 2.0 * math.pi)
     order = np.argsort(bearings)
     ordered_rad = bearings[order]
     before_rad = np.concatenate((ordered_rad[-1:] - 2.0 * math.pi, ordered_rad[:-1]))
     gaps = ordered_rad - before_rad
     widest = int(gaps.argmax())
-    if gaps[widest] > 1.5 * scan.beam_width_rad:
-        order = np.concatenate((order[widest:], order[:widest]))  # a fan begins and ends at its edges
+    is_fan = bool(gaps[widest] > 1.5 * scan.beam_width_rad)
+    if is_fan:
+        order = np.concatenate((order[widest:], order[:widest]))  # it begins and ends at its edges
+    ordered = alone_in(scan.beam_width_rad, scan.range_m[order], scan.max_range_m - IN_RANGE_M, is_fan)
     thing = np.empty(len(order), np.int64)
-    thing[order] = alone_in(scan.beam_width_rad, scan.range_m[order], scan.max_range_m - IN_RANGE_M)
-    return thing[np.isfinite(scan.range_m)]
+    thing[order] = ordered
+    sides = {int(ordered[-1]): 1, int(ordered[0]): -1}
+    cut = {number: side for number, side in sides.items() if number >= 0 and is_fan}
+    return thing[np.isfinite(scan.range_m)], cut
 
 
 def _seen_things(
-    ends: Points, free: NDArray[np.bool_], thing: NDArray[np.int64], pose: Pose, beam_width_rad: float
+    ends: Points, free: NDArray[np.bool_], alone: tuple[NDArray[np.int64], dict[int, int]], pose: Pose, beam_rad: float
 ) -> list[Sighting]:
     """What may move: readings on free ground (``free``), things of which a part is, and with fine beams what is alone.
 
-    ``thing``: the number of the thing that stands alone to which a reading belongs; -1: none.
+    ``alone``: see ``_alone``.
     """
-    known, alone = free.copy(), []
+    (thing, cut), fine = alone, beam_rad <= FINE_RAD
+    known, found = free.copy(), []
     for number in sorted(set(thing[thing >= 0].tolist())):
         own = thing == number
-        if free[own].mean() >= PART_FREE:
+        on_free = bool(free[own].mean() >= PART_FREE)
+        if fine and number in cut:
+            known[own] = False
+            found.append(_cut_sighting(ends[own], cut[number], pose, on_free_ground=on_free))
+        elif on_free:
             known[own] = True
-        elif beam_width_rad <= FINE_RAD and not free[own].any():
-            alone.append(ends[own])
+        elif fine and not free[own].any():
+            found.append(_sighting(ends[own], pose, beam_rad, on_free_ground=False))
     groups = _groups(ends[known], free[known])
-    found = [_sighting(seen, pose, beam_width_rad, on_free_ground=on_free) for seen, on_free in groups]
-    found += [_sighting(seen, pose, beam_width_rad, on_free_ground=False) for seen in alone]
+    found += [_sighting(seen, pose, beam_rad, on_free_ground=on_free) for seen, on_free in groups]
     return [one for one in found if one.seen_m <= WIDEST_M and (one.on_free_ground or one.seen_m >= ALONE_NARROWEST_M)]
 
 
@@ -323,3 +345,17 @@ def _sighting(seen: Points, pose: Pose, beam_width_rad: float, *, on_free_ground
     east_m = float(middle[1]) + behind_m * math.sin(away_rad)
     blur_m = 0.5 * beam_width_rad * math.dist(middle, (pose.north_m, pose.east_m))
     return Sighting(pose.time_s, north_m, east_m, radius_m, blur_m, seen_m, on_free_ground)
+
+
+def _cut_sighting(seen: Points, side: int, pose: Pose, *, on_free_ground: bool) -> Sighting:
+    """Readings of a thing of which a part is out of sight on this side: of its middle only the other side tells."""
+    away = seen - (pose.north_m, pose.east_m)
+    bearings_rad = np.arctan2(away[:, 1], away[:, 0])
+    beside_rad = np.mod(bearings_rad - pose.heading_rad + math.pi, 2.0 * math.pi) - math.pi
+    edge = int(np.argmin(side * beside_rad))
+    across_rad = float(bearings_rad[edge]) + side * 0.5 * math.pi
+    seen_m = float(np.hypot(*(seen - seen[edge]).T).max())
+    radius_m = max(seen_m / 2.0, LEAST_RADIUS_M)
+    north_m = float(seen[edge, 0]) + radius_m * math.cos(across_rad)
+    east_m = float(seen[edge, 1]) + radius_m * math.sin(across_rad)
+    return Sighting(pose.time_s, north_m, east_m, radius_m, 0.0, seen_m, on_free_ground, cut=True)
