@@ -318,7 +318,17 @@ def _seen_things(
             found.append(_sighting(ends[own], pose, beam_rad, on_free_ground=False))
     groups = _groups(ends[known], free[known])
     found += [_sighting(seen, pose, beam_rad, on_free_ground=on_free) for seen, on_free in groups]
-    return [one for one in found if one.seen_m <= WIDEST_M and (one.on_free_ground or one.seen_m >= ALONE_NARROWEST_M)]
+    return [one for one in found if _may_move(one)]
+
+
+def _may_move(thing: Sighting) -> bool:
+    """Whether it is as wide as things that move are: what only stands alone, or of which a part is out of sight, may
+    be the end of a wall.
+    """
+    if thing.on_free_ground and not thing.cut:
+        return thing.seen_m <= WIDEST_M
+    least_m = 0.0 if thing.on_free_ground else ALONE_NARROWEST_M
+    return least_m <= thing.seen_m <= ALONE_WIDEST_M
 
 
 def _groups(points: Points, free: NDArray[np.bool_]) -> list[tuple[Points, bool]]:
@@ -356,6 +366,7 @@ def _cut_sighting(seen: Points, side: int, pose: Pose, *, on_free_ground: bool) 
     across_rad = float(bearings_rad[edge]) + side * 0.5 * math.pi
     seen_m = float(np.hypot(*(seen - seen[edge]).T).max())
     radius_m = max(seen_m / 2.0, LEAST_RADIUS_M)
-    north_m = float(seen[edge, 0]) + radius_m * math.cos(across_rad)
-    east_m = float(seen[edge, 1]) + radius_m * math.sin(across_rad)
+    # Always as far: what is seen of it, and with it the radius, changes while it gets into sight.
+    north_m = float(seen[edge, 0]) + LEAST_RADIUS_M * math.cos(across_rad)
+    east_m = float(seen[edge, 1]) + LEAST_RADIUS_M * math.sin(across_rad)
     return Sighting(pose.time_s, north_m, east_m, radius_m, 0.0, seen_m, on_free_ground, cut=True)

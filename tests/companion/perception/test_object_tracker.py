@@ -123,6 +123,33 @@ def test_a_walker_on_ground_that_was_never_seen_is_noticed_in_time(suite: str, l
         assert ahead_m > least_m
 
 
+def test_a_walker_at_the_edge_of_the_view_is_noticed_in_time_and_goes_where_it_goes() -> None:
+    """It would pass close behind: the edge of the view cuts it off from the first, at 4 m."""
+    sees_s, there_m = 3.0, 10.0 + 2.0 * 3.0 + 3.55
+    track = timed_track([(there_m, 22.8 + 0.9 * sees_s), (there_m, 10.0)], 0.9, 0.0, repeats=False)
+    for seed in range(6):
+        watcher = Watcher(World(np.zeros((40, 40), np.bool_), movers=(Mover("m", 0.4, track),)), "lidar-90", seed, 2.0)
+        found = [watcher.look() for _ in range(round(sees_s / PERIOD_S) + 8)][-1]
+        assert len(found) == 1
+        assert abs(found[0].east_m_s + 0.9) < 0.3 and abs(found[0].north_m_s) < 0.3
+        there = watcher.world.mover_at(0, found[0].time_s)[:2]
+        assert found[0].point.distance_m(NedPoint(*there)) < 0.35
+
+
+@pytest.mark.parametrize("speed_m_s", [1.0, 1.9])
+def test_corners_and_ends_of_walls_at_the_edge_of_the_view_do_not_move(speed_m_s: float) -> None:
+    """The view of a rover that drives past sweeps over them."""
+    for seed in range(6):
+        chance = np.random.default_rng(seed)
+        obstacles = np.zeros((40, 40), np.bool_)
+        for north in range(11, 30, 3):
+            east = int(chance.choice((17, 18, 21, 22)))
+            obstacles[north : north + int(chance.integers(1, 3)), east : east + int(chance.integers(1, 3))] = True
+        obstacles[:, 19:21] = False
+        watcher = Watcher(World(obstacles), "lidar-90", seed, speed_m_s)
+        assert sum(bool(watcher.look()) for _ in range(80)) <= 3
+
+
 def test_four_scans_are_enough_also_where_they_do_not_come_exactly_in_time() -> None:
     seen = tuple(Sighting(time_s, 5.0 + time_s, 3.0, 0.4, 0.0, 0.5, True) for time_s in (0.0, 0.1, 0.2, 0.2999))
     assert Track(1, seen[:3]).estimate() is None
