@@ -197,6 +197,14 @@ class MissionExecutor:
         elsewhere = self.progress.requested is not None or self.progress.phase is not MissionPhase.TRAVEL
         return "" if elsewhere else self.layout.refused.get(self.progress.index, "")
 
+    @property
+    def blocked_since_s(self) -> float | None:
+        """Since when the present target is waited for, as its way is blocked; None where it is not, or not known."""
+        give_up_s = self.progress.give_up_s
+        if give_up_s is None or not math.isfinite(give_up_s):
+            return None
+        return give_up_s - self._settings.current.navigator.wait_limit_s
+
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
         return [(t.name, status) for t, status in zip(self.progress.targets, self.progress.statuses, strict=True)]
@@ -570,6 +578,22 @@ class MissionExecutor:
                 text += ": arcs need wide ones"
         self._notifier.tell(text, Severity.INFO)
 
+    def _give_up(self, what: str, now_s: float) -> None:
+        """There is no way to the goal. ``what``: its name, and why."""
+        navigator = self._settings.current.navigator
+        # How long a leg of AUTO may take is the autopilot's to say (DO_GUIDED_LIMITS).
+        limit_s = math.inf if self._mission.in_auto else navigator.wait_limit_s
+        after = on_unreachable(self.progress, now_s, navigator.wait_retry_s, limit_s)
+        waits = after.phase is MissionPhase.WAIT and after.tries_again
+        text = f"No way now: {what}; tries again in {navigator.wait_retry_s:g} s" if waits else f"Unreachable: {what}"
+        self._notifier.tell(text, Severity.WARNING)
+        self._tell_of_gaps()
+        if len(self._refuges) > 1:
+            self._refuges.pop(0)
+            self._seek_refuge()
+        else:
+            self._advance(after, now_s)
+
     def _take_decision(self, decision: Decision, at: NedPoint, now_s: float) -> None:
         goal = self.progress.goal
         self.decisions += 1
@@ -578,15 +602,6 @@ class MissionExecutor:
             self._notifier.tell(f"Reached {goal.name}", Severity.INFO)
             self._advance(on_reached(self.progress, now_s, at), now_s)
         elif decision.action is Action.UNREACHABLE:
-            self._notifier.tell(f"Unreachable: {goal.name} ({decision.reason})", Severity.WARNING)
-            self._tell_of_gaps()
-            navigator = self._settings.current.navigator
-            if len(self._refuges) > 1:
-                self._refuges.pop(0)
-                self._seek_refuge()
-            else:
-                # How long a leg of AUTO may take is the autopilot's to say (DO_GUIDED_LIMITS).
-                limit_s = math.inf if self._mission.in_auto else navigator.wait_limit_s
-                self._advance(on_unreachable(self.progress, now_s, navigator.wait_retry_s, limit_s), now_s)
+            self._give_up(f"{goal.name} ({decision.reason})", now_s)
         if decision.action in (Action.REACHED, Action.UNREACHABLE):
             self.driver.leave()

@@ -76,6 +76,13 @@ class MissionProgress:
         )
 
     @property
+    def tries_again(self) -> bool:
+        """Whether the target that counts as unreachable now will be tried again."""
+        under_way = self.phase in (MissionPhase.TRAVEL, MissionPhase.WAIT) and self.index < len(self.targets)
+        waits = self.give_up_s is not None and under_way
+        return waits and self.statuses[self.index] is TargetStatus.UNREACHABLE
+
+    @property
     def following(self) -> int:
         """The index of the target after the present one; the number of targets if there is none."""
         after = self.index + 1

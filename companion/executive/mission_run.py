@@ -30,7 +30,7 @@ from companion.mission.mission import Mission
 from companion.navigation.step_runner import StepRunner
 from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import LatchState, Reaction, Verdict
-from companion.safety.reasons import Activity, EndReason, Reason, RunPhase, WaitReason
+from companion.safety.reasons import Activity, Doubt, EndReason, Reason, RunPhase, WaitReason
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import Command, GuidedPosition, SetMode
 from companion.vehicle.events import AckSeen, Event, RoverMode
@@ -77,8 +77,8 @@ class MissionRun:
     """What all parts of the companion share of a run.
 
     Each attribute has one writer: the event dispatcher writes ``vehicle`` (after an error, the shutdown), the drive
-    permission ``latch``, ``stop`` and ``taken_over``, arming ``awaited`` and ``laid``, the shutdown ``end``, the
-    mission requests ``paused`` and ``start_paused``. ``activity`` follows from them.
+    permission ``latch``, ``stop``, ``taken_over`` and ``held_for``, arming ``awaited`` and ``laid``, the shutdown
+    ``end``, the mission requests ``paused`` and ``start_paused``. ``activity`` follows from them.
     """
 
     def __init__(
@@ -105,6 +105,8 @@ class MissionRun:
         """Why the rover was not to be driven in the last tick; None if it was."""
         self.taken_over = False
         """Somebody else changed the mode while the companion had the rover: a person, or the autopilot itself."""
+        self.held_for: Reason[Doubt] | None = None
+        """Why the companion has given the rover up and asked for HOLD; None once it drives again."""
         self.end: Reason[EndReason] | None = None
         """Why the run ends; None while it goes on."""
         self.paused = False
@@ -124,8 +126,11 @@ class MissionRun:
     @property
     def activity(self) -> Activity:
         """What the run does now."""
-        if self.end is not None:
-            return Activity(RunPhase.ENDED, self.end)
+        return self.under_way if self.end is None else Activity(RunPhase.ENDED, self.end)
+
+    @property
+    def under_way(self) -> Activity:
+        """What it does now, or did when it ended."""
         if self.executor is None:
             phase = RunPhase.CONNECTING if self.awaited is None else RunPhase.WAITING
             return Activity(phase, awaited=self.awaited)

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, TypeVar
 
-ARM_AGAIN = "arm (or end this run, and start another with --arm, without --resume)"
-
 
 class Doubt(Enum):
     """Why the rover must not move now."""
@@ -98,8 +96,8 @@ class WaitReason(Enum):
     AUTOPILOT_HEARD = "the autopilot to be heard again"
     PERSON_SETS_MODE = "a person to set {}"
     REQUEST_TO_GO_ON = "a person to ask it to go on, or to set {}"
-    PERSON_ARMS_AGAIN = f"a person to {ARM_AGAIN}"
-    PERSON_SETS_MODE_AND_ARMS = f"a person to set {{}} and {ARM_AGAIN}"
+    PERSON_ARMS_AGAIN = "a person to arm"
+    PERSON_SETS_MODE_AND_ARMS = "a person to set {} and arm"
     GOOD_DATA_AND = "good data ({}) and {}"
 
 

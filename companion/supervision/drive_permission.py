@@ -10,7 +10,7 @@ from dataclasses import replace
 from companion.core.severity import Severity, TextSink
 from companion.executive.mission_run import MissionRun, Stop
 from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched
-from companion.safety.reasons import FOR_A_PERSON, LatchReason, Reason, WaitReason
+from companion.safety.reasons import FOR_A_PERSON, Doubt, LatchReason, Reason, WaitReason
 from companion.safety.watchdogs import Monitor, first_doubt
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events import Event
@@ -18,7 +18,7 @@ from companion.vehicle.state import VehicleState
 
 
 class DrivePermission:
-    """``monitors``: in order of precedence. This class alone writes the run's ``latch`` and ``stop``."""
+    """``monitors``: in order of precedence. It alone writes the run's latch, and why the rover is not driven."""
 
     def __init__(
         self, run: MissionRun, monitors: tuple[Monitor, ...], settings: LiveSettings, notifier: TextSink
@@ -50,10 +50,23 @@ class DrivePermission:
         if changed or (drives and before is not Control.COMPANION):
             run.start_afresh()
         run.stop = None if drives else self._stop(verdict, now_s)
+        run.held_for = None if drives else self._held_for(verdict, now_s)
         run.taken_over = not drives and (run.taken_over or _is_taken(verdict, before))
         if not drives:
             self._tell(verdict, before)
         return verdict
+
+    def _held_for(self, verdict: Verdict, now_s: float) -> Reason[Doubt] | None:
+        """Why HOLD was asked for: the first doubt; or that the autopilot is silent, which has led to all others."""
+        run = self._run
+        if verdict.reaction is Reaction.HOLD and verdict.reason is not None and isinstance(verdict.reason.kind, Doubt):
+            return Reason(verdict.reason.kind, verdict.reason.figures)
+        awaited, heartbeat = None if run.stop is None else run.stop.awaited, run.vehicle.heartbeat
+        if run.held_for is None or run.held_for.kind is not Doubt.DATA_OLD or heartbeat is None or awaited is None:
+            return run.held_for
+        not_since = run.latch.hold_sent and heartbeat.time_s < run.latch.hold_s
+        silent = not_since and awaited.kind is WaitReason.AUTOPILOT_HEARD
+        return Reason(Doubt.DATA_OLD, ("autopilot", int(now_s - heartbeat.time_s))) if silent else run.held_for
 
     def _stop(self, verdict: Verdict, now_s: float) -> Stop:
         """What is awaited is of interest only once the companion is silent."""

@@ -17,7 +17,7 @@ from companion.core.clock import stopwatch_s
 from companion.safety.reasons import EndReason, Reason
 from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
-from companion.viewer.frame import ending_of, frame_of, news_of, scene_of, told
+from companion.viewer.frame import end_of, frame_of, news_of, scene_of, told
 from companion.viewer.headway import Headway
 from companion.viewer.last_place import LastPlace
 from companion.viewer.map_tiles import TileWatch
@@ -85,8 +85,7 @@ class ViewerFeed:
         """The last moment, of a run that ended otherwise than by itself."""
         frame = self._frame(self._companion.status())
         if frame["state"] != "ended":
-            line, why = ending_of(self._companion, Reason(reason))
-            frame.update(state="ended", line=line, why=why, **wire.NOBODY_DRIVES)
+            frame.update(**end_of(self._companion, Reason(reason)), **wire.NOBODY_DRIVES)
         if self._put({**frame, "news": self._news}):
             self._news = []
 

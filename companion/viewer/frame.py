@@ -26,7 +26,7 @@ from companion.core.frames import LocalFrame, NedPoint
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity
 from companion.executive.mission_executor import MissionExecutor
-from companion.executive.mission_progress import TargetStatus
+from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.executive.mission_run import MissionRun
 from companion.mapping.map_queries import clearance_m
 from companion.mission.bounds import Bound
@@ -56,6 +56,8 @@ REACHED = TargetStatus.REACHED
 SOMEBODY = "a person, or by the autopilot itself"
 BY_MODE = (WaitReason.PERSON_SETS_MODE, WaitReason.PERSON_SETS_MODE_AND_ARMS)
 MAKES_WAY, SEPARATOR = str(Hindrance.MAKES_WAY.value), "; "
+AGAIN = "trying again: the way was blocked"
+BY_COMPANION = "the companion asked for HOLD"
 PLAIN_ENDS = (EndReason.DONE, EndReason.STOPPED_BY_USER)
 """The others are told as what ended the run."""
 PAUSED = "paused: after that it waits for Go on"
@@ -66,7 +68,7 @@ STATES = {
     RunPhase.CONNECTING: "connecting",
     RunPhase.WAITING: "waiting",
     RunPhase.DRIVING: "driving",
-    RunPhase.STAYING: "driving",
+    RunPhase.STAYING: "waiting",
     RunPhase.WAY_BLOCKED: "waiting",
     RunPhase.STOPPED: "stopped",
     RunPhase.STOPPED_AND_WAITING: "stopped",
@@ -119,7 +121,7 @@ def frame_of(companion: Companion, status: Status, headway: Headway | None = Non
         **mode_of(vehicle, run),
         **doing_of(companion, status, headway),
         "held_up": "" if headway is None else headway.line,
-        "statuses": [str(one) for _, one in run.statuses()],
+        "statuses": statuses_of(run),
         "goal": _goal(executor),
         "path": _path(executor),
         "motion": _motion(executor, now_s),
@@ -209,11 +211,23 @@ def _map(executor: MissionExecutor) -> Json:
     }
 
 
+def statuses_of(run: MissionRun) -> list[str]:
+    """What has become of each target. One that will be tried again is no failure yet: it is waited for, or next."""
+    statuses = [str(one) for _, one in run.statuses()]
+    progress = None if run.executor is None else run.executor.progress
+    if progress is not None and progress.tries_again and run.end is None:
+        waits = progress.phase is MissionPhase.WAIT
+        statuses[progress.index] = "waiting" if waits else str(TargetStatus.PENDING)
+    return statuses
+
+
 def doing_of(companion: Companion, status: Status, headway: Headway | None = None) -> Json:
     """One large line; then what is awaited where it says why the rover stands, or why it drives as it does."""
     activity, line, why = status.activity, status.doing, ""
     if activity.phase is RunPhase.DRIVING and status.target:
         line, why = _driving(companion, status, headway)
+    elif activity.phase in (RunPhase.WAY_BLOCKED, RunPhase.STAYING) and companion.executor is not None:
+        line, why = _standing(companion.executor, status)
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
         line, why = _stopped(companion, activity)
     elif activity.phase is RunPhase.WAITING:
@@ -222,6 +236,8 @@ def doing_of(companion: Companion, status: Status, headway: Headway | None = Non
         if companion.mission_run.start_paused and activity.awaited != Reason(WaitReason.REQUEST_TO_BEGIN):
             why = SEPARATOR.join(filter(None, (why, PAUSED)))
     state = STATES[activity.phase]
+    if state == "driving" and headway is not None and headway.stands_for_others:
+        state = "waiting"
     if state == "stopped" and (other := _driven_by(companion)):
         line, state = other, "waiting"
     elif state == "stopped" and abs(companion.vehicle.forward_m_s) > ROLLS_M_S:
@@ -242,6 +258,8 @@ def _driving(companion: Companion, status: Status, headway: Headway | None) -> t
     why = [] if early is None else [str(early)]
     if headway is not None and headway.line:
         return headway.line, SEPARATOR.join(why)
+    if companion.executor is not None and companion.executor.progress.tries_again:
+        why.append(AGAIN)
     if companion.executor is not None and companion.executor.driver.makes_way:
         why.append(MAKES_WAY)
     if headway is not None and headway.rerouted:
@@ -249,19 +267,51 @@ def _driving(companion: Companion, status: Status, headway: Headway | None) -> t
     return line, SEPARATOR.join(why)
 
 
+def _standing(executor: MissionExecutor, status: Status) -> tuple[str, str]:
+    """Where the rover stands and makes way or waits, for how long, and what comes then."""
+    progress = executor.progress
+    goal, left_s = progress.goal.name, progress.until_s - status.time_s
+    if executor.phase is RunPhase.WAY_BLOCKED:
+        since_s = executor.blocked_since_s
+        why = [] if since_s is None else [f"blocked for {lasting(status.time_s - since_s)}"]
+        why.append(f"tries again in {lasting(left_s)}")
+        if since_s is not None and progress.give_up_s is not None:
+            why.append(f"gives up in {lasting(progress.give_up_s - status.time_s)}")
+        return f"waiting for the way to {goal} to clear", ", ".join(why)
+    if progress.phase is not MissionPhase.STAY:
+        return "staying here for the mission's commands", f"next: {goal}"
+    if progress.statuses[progress.index] is not REACHED:  # AUTO has not handed over a leg
+        return "staying where it is", ""
+    stays = f"for {lasting(left_s)} more" if 0.0 < left_s < math.inf else ""
+    commands = "until its commands are done" if progress.commands.keeps_here else ""
+    last = progress.following >= len(progress.targets)
+    then = "it is the last target" if last else f"next: {progress.targets[progress.following].name}"
+    return f"staying at {goal}", SEPARATOR.join(filter(None, (stays or commands, then)))
+
+
+def lasting(seconds: float) -> str:
+    """A duration as the page tells them: 4 s, 3 min, 2 h."""
+    if seconds < 100.0:
+        return f"{max(seconds, 0.0):.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.0f} h"
+
+
 def _stopped(companion: Companion, activity: Activity) -> tuple[str, str]:
     """Why it stands, and what for. Data that is missing comes before the mode: mostly the one has led to the other.
     An autopilot that has restarted has led to everything else.
     """
-    vehicle = companion.vehicle
+    run, awaited = companion.mission_run, activity.awaited
+    waiting = f"waiting for {awaited}"
     if activity.reason is not None and activity.reason.kind is LatchReason.RESTARTED:
-        return f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
-    if activity.awaited is not None and activity.awaited.kind is WaitReason.GOOD_DATA_AND:
-        data, person = activity.awaited.figures
+        return f"stopped: {activity.reason}", waiting
+    if awaited is not None and awaited.kind is WaitReason.GOOD_DATA_AND:
+        data, person = awaited.figures
         return f"stopped: {data}", f"waiting for good data and {person}"
-    if companion.mission_run.taken_over and activity.awaited is not None and activity.awaited.kind in BY_MODE:
-        return f"stopped: {mode_name(vehicle)} was set by {SOMEBODY}", f"waiting for {activity.awaited}"
-    return f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
+    if run.taken_over and awaited is not None and awaited.kind in BY_MODE:
+        return f"stopped: {mode_name(companion.vehicle)} was set by {SOMEBODY}", waiting
+    if run.held_for is not None:
+        waiting = f"it had stopped: {run.held_for} ({BY_COMPANION}){SEPARATOR}{waiting}"
+    return f"stopped: {activity.reason}", waiting
 
 
 def _driven_by(companion: Companion) -> str:
@@ -276,17 +326,38 @@ def _driven_by(companion: Companion) -> str:
 def ending_of(companion: Companion, reason: Reason[Enum]) -> tuple[str, str]:
     """How it ended; which targets were not reached, and how the rover is left where a person must know."""
     line = str(reason) if reason.kind in PLAIN_ENDS else f"ended, {reason}"
+    before: list[str] = []
+    if reason.kind is EndReason.NOBODY_HERE:
+        line, before = "ended, nobody is here", [_unattended(companion)]
     statuses = companion.statuses()
     missed = [f"{name}: {NOT_REACHED.get(status, status)}" for name, status in statuses if status != REACHED]
     left = [] if companion.parting is None else [str(companion.parting)]
     if not missed:
-        return line, SEPARATOR.join(left)
+        return line, SEPARATOR.join(before + left)
     more = f", and {len(missed) - MOST_MISSED} more" if len(missed) > MOST_MISSED else ""
     early = companion.outcome.broken_off
     if reason.kind is EndReason.DONE:
         line = "ended" if early is None else f"ended early, {early}"
     reached = f"{len(statuses) - len(missed)} of {len(statuses)} targets reached"
-    return f"{line}: {reached}", SEPARATOR.join([", ".join(missed[:MOST_MISSED]) + more, *left])
+    return f"{line}: {reached}", SEPARATOR.join([*before, ", ".join(missed[:MOST_MISSED]) + more, *left])
+
+
+def _unattended(companion: Companion) -> str:
+    """What a run that nobody attended to waited for, and why the rover stood."""
+    activity = companion.mission_run.under_way
+    waited = str(activity) if activity.awaited is None else f"it waited for {activity.awaited}"
+    if activity.phase is not RunPhase.STOPPED_AND_WAITING:
+        return waited
+    held_for = companion.mission_run.held_for
+    stopped = _stopped(companion, activity)[0].removeprefix("stopped: ")
+    return f"{waited}{SEPARATOR}it had stopped: {stopped if held_for is None else f'{held_for} ({BY_COMPANION})'}"
+
+
+def end_of(companion: Companion, reason: Reason[Enum]) -> Json:
+    """What changes in the last frame of a run that ended otherwise than by itself."""
+    line, why = ending_of(companion, reason)
+    statuses = [str(one) for _, one in companion.statuses()]
+    return {"state": "ended", "line": line, "why": why, "statuses": statuses}
 
 
 def mode_of(vehicle: VehicleState, run: MissionRun) -> Json:

@@ -21,6 +21,8 @@ CIRCLES = ((0.3, 6.0), (1.0, 12.0))
 change of direction, takes less."""
 YIELDS = ((0.3, 3.0),)
 """The same for one that makes way: it does not turn meanwhile."""
+STANDS_M_S, STOOD_S = 0.15, 0.5
+"""One that makes way and has been slower for so long stands for others."""
 REROUTES = (
     DecisionReason.PATH_BLOCKED,
     DecisionReason.BETTER_PATH,
@@ -54,6 +56,9 @@ class Headway:
         """Whether this tick is the first of it."""
         self.rerouted = ""
         """Why it has just taken another way, in words; empty where it has not."""
+        self.stands_for_others = False
+        """Whether it stands now, because something moves."""
+        self._stands_since_s: float | None = None
         self._decision: Decision | None = None
         self._target = ""
         self._rerouted_s = -math.inf
@@ -68,6 +73,7 @@ class Headway:
         where = " to" if self.hindrance is Hindrance.STUCK else ", heading for"
         self.line = "" if self.hindrance is None else f"{self.hindrance.value}{where} {status.target}"
         self.begins = self.hindrance not in (None, before)
+        self.stands_for_others = self.hindrance is Hindrance.MAKES_WAY and self._stands_since_s is not None
         self._note_decision(status)
 
     def _note_decision(self, status: Status) -> None:
@@ -87,8 +93,12 @@ class Headway:
     def _look(self, companion: Companion, status: Status) -> Hindrance | None:
         driver, pose = companion.driver, status.pose
         if driver is None or pose is None or status.activity.phase is not RunPhase.DRIVING or not status.target:
-            self._centres, self._stuck = {}, None
+            self._centres, self._stuck, self._stands_since_s = {}, None, None
             return None
+        if abs(companion.vehicle.forward_m_s) > STANDS_M_S:
+            self._stands_since_s = None
+        elif self._stands_since_s is None:
+            self._stands_since_s = status.time_s
         if self._stuck is None or driver.decision is not None:
             self._stuck = driver.tally.stuck
         if driver.makes_way:
@@ -97,7 +107,8 @@ class Headway:
             self._centres = {}
             return Hindrance.STUCK
         made_way = status.time_s - self._made_way_s <= MADE_WAY_S
-        if not self._lingers(pose, status.time_s, YIELDS if made_way else CIRCLES):
+        stood = self._stands_since_s is not None and status.time_s - self._stands_since_s >= STOOD_S
+        if not (made_way and stood) and not self._lingers(pose, status.time_s, YIELDS if made_way else CIRCLES):
             return None
         return Hindrance.MAKES_WAY if made_way else Hindrance.HARDLY
 

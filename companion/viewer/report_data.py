@@ -26,7 +26,7 @@ from companion.replay.explain import Candidate, DecisionExplainer, Explanation, 
 from companion.replay.replay import ReplayObserver, ReplayResult, replay
 from companion.safety.reasons import EndReason, Reason
 from companion.viewer.arrivals import Arrivals
-from companion.viewer.frame import doing_of, ending_of, frame_of, news_of, scene_of
+from companion.viewer.frame import doing_of, end_of, frame_of, news_of, scene_of
 from companion.viewer.headway import Headway
 from companion.viewer.last_place import LastPlace
 from companion.viewer.map_tiles import TileWatch
@@ -163,7 +163,7 @@ class ReportWatch(ReplayObserver):
             self._frame_s = time_s
             self._keep(companion, status, time_s)
             self._take_map(companion, time_s)
-        elif self._headway.begins or doing_of(companion, status)["state"] != self._before["state"]:
+        elif self._headway.begins or doing_of(companion, status, self._headway)["state"] != self._before["state"]:
             self._keep(companion, status, time_s)  # however short it is, what the tables count is to be seen
 
     def end(self, companion: Companion, time_s: float, reason: EndReason | None) -> None:
@@ -172,8 +172,7 @@ class ReportWatch(ReplayObserver):
             self._keep(companion, companion.status(), time_s)
             self._take_map(companion, time_s)
         if reason is not None and self._before["state"] != "ended":
-            line, why = ending_of(companion, Reason(reason))
-            self.frames[-1].update(state="ended", line=line, why=why)
+            self.frames[-1].update(end_of(companion, Reason(reason)))
 
     def _keep(self, companion: Companion, status: Status, time_s: float) -> None:
         """A frame of this moment, without what has not changed since the last one."""

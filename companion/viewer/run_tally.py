@@ -136,7 +136,7 @@ class RunTally(ReplayObserver):
         hindrance = self._headway.hindrance
         held_up = "" if hindrance is None else hindrance.value
         name = doing["line"].replace("stopping: ", "stopped: ", 1)
-        self._stood.note(name if doing["state"] in STOOD else held_up, time_s, step_s)
+        self._stood.note(held_up or (name if doing["state"] in STOOD else ""), time_s, step_s)
         self._doubted.note(_doubt(companion), time_s, step_s)
         stopped = doing["state"] == "stopped" or phase is RunPhase.WAY_BLOCKED
         self.stops += stopped and not self._stopped

@@ -70,7 +70,8 @@ class Unattended:
     def _end(self, status: Status, why: Reason[EndReason]) -> None:
         if not self._ended:
             self._ended = True
-            self._say(f"{status.time_s:6.1f} s  ended: {why}")
+            doing = f" ({status.doing})" if why.kind is EndReason.NOBODY_HERE else ""
+            self._say(f"{status.time_s:6.1f} s  ended: {why}{doing}")
             self._run.companion.stop(why.kind)
 
 

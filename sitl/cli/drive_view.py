@@ -9,6 +9,7 @@ from companion.app import Status
 from companion.core.clock import stopwatch_s
 from companion.executive.mission_progress import TargetStatus
 from companion.navigation.field_step import Part
+from companion.safety.reasons import EndReason, Reason
 from companion.viewer.frame import doing_of
 from companion.viewer.headway import Headway
 from companion.viewer.terminal.known import headline_of, known_layers, mission_section, path_ahead, target_places
@@ -90,6 +91,8 @@ class DriveView:
         self._take_in(status)
         doing = doing_of(self._run.companion, status, self._headway)
         waits = f"{doing['line']}, {doing['why']}" if doing["state"] in ("stopped", "waiting") else ""
+        if status.activity.reason == Reason(EndReason.NOBODY_HERE):
+            waits = doing["why"]
         self._show(self._view(status, stopwatch_s(), outcome_line(report, waits)))
         return status
 

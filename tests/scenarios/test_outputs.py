@@ -139,7 +139,8 @@ def test_texts_are_told_as_they_come_and_a_run_that_waits_for_a_person_is_ended(
     lines = [line.split(" s  ", 1)[-1] for line in result.stdout.splitlines() if line.startswith("yard: ")]
     heading = next(index for index, line in enumerate(lines) if line.startswith("Heading for "))
     silent = lines.index("Companion no longer steers: mode is not GUIDED; it waits for a person to set GUIDED")
-    ended = lines.index("ended: nobody is here to do what the companion waits for")
+    why = "stopped: mode is not GUIDED, waiting for a person to set GUIDED"
+    ended = lines.index(f"ended: nobody is here to do what the companion waits for ({why})")
     assert heading < silent < ended and len(lines) < 12
     assert "outcome: incomplete" in result.stdout
 

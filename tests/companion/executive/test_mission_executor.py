@@ -205,3 +205,11 @@ def test_with_a_target_that_cannot_be_reached_it_says_which_gaps_count_as_closed
     desk.begin()
     step(desk)
     assert desk.notices.texts[1].startswith("Unreachable: gate") and desk.notices.texts[2] == told
+
+
+def test_a_target_that_is_tried_again_is_not_called_unreachable(tmp_path: Path) -> None:
+    desk = Desk(tmp_path, GATE + 'on_blocked = "wait"\n' + WALLED)
+    desk.begin()
+    step(desk)
+    assert desk.notices.texts[1].startswith("No way now: gate (") and "; tries again in 5 s" in desk.notices.texts[1]
+    assert desk.executor.progress.tries_again and desk.executor.blocked_since_s == pytest.approx(desk.now_s)

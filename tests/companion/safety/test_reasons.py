@@ -21,7 +21,6 @@ from companion.safety.reasons import (
     WaitReason,
 )
 
-AGAIN = "arm (or end this run, and start another with --arm, without --resume)"
 OLD = Reason(Doubt.DATA_OLD, ("position", 1.0))
 LOW = Reason(PowerReason.CHARGE, ("battery", 12))
 
@@ -97,8 +96,8 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (WaitReason.AUTOPILOT_HEARD, (), "the autopilot to be heard again"),
     (WaitReason.PERSON_SETS_MODE, ("AUTO",), "a person to set AUTO"),
     (WaitReason.REQUEST_TO_GO_ON, ("GUIDED",), "a person to ask it to go on, or to set GUIDED"),
-    (WaitReason.PERSON_ARMS_AGAIN, (), f"a person to {AGAIN}"),
-    (WaitReason.PERSON_SETS_MODE_AND_ARMS, ("GUIDED",), f"a person to set GUIDED and {AGAIN}"),
+    (WaitReason.PERSON_ARMS_AGAIN, (), "a person to arm"),
+    (WaitReason.PERSON_SETS_MODE_AND_ARMS, ("GUIDED",), "a person to set GUIDED and arm"),
     (
         WaitReason.GOOD_DATA_AND,
         (OLD, Reason(WaitReason.PERSON_SETS_MODE, ("AUTO",))),

@@ -19,12 +19,13 @@ class Says:
 
     def __init__(self, doubt: Doubt | None = None) -> None:
         self.said = doubt
+        self.figures: tuple[object, ...] = ()
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """Ignored."""
 
     def doubt(self, now_s: float) -> Reason[Doubt] | None:
-        return None if self.said is None else Reason(self.said)
+        return None if self.said is None else Reason(self.said, self.figures)
 
 
 class Permitted(Desk):
@@ -55,6 +56,32 @@ def test_the_first_doubt_stops_the_rover_and_is_told(tmp_path: Path) -> None:
     assert permitted.run.latch.control is Control.PERSON
     permitted.stand(0.0, 0.0, mode=HOLD)
     assert permitted.verdict() is Reaction.SILENT and not permitted.run.taken_over, "this HOLD is the companion's own"
+
+
+def test_why_hold_was_asked_for_is_known_until_it_drives_again(tmp_path: Path) -> None:
+    """An autopilot that is silent has led to everything else."""
+    permitted = Permitted(tmp_path)
+    permitted.verdict()
+    permitted.first.said, permitted.first.figures = Doubt.DATA_OLD, ("position", 1.0)
+    assert permitted.verdict() is Reaction.STOP and permitted.run.held_for is None
+    assert permitted.verdict(5.0) is Reaction.HOLD and str(permitted.run.held_for) == "position silent for over 1 s"
+    permitted.verdict(20.0)
+    assert str(permitted.run.held_for) == "autopilot silent for over 25 s"
+    permitted.first.said = None
+    permitted.stand(0.0, 0.0, mode=HOLD)
+    assert permitted.verdict() is Reaction.SILENT and not permitted.run.taken_over
+    assert str(permitted.run.held_for) == "autopilot silent for over 25 s"
+    permitted.stand(0.0, 0.0)
+    assert permitted.verdict() is Reaction.DRIVE and permitted.run.held_for is None
+
+
+def test_an_autopilot_that_falls_silent_later_is_not_why_hold_was_asked_for(tmp_path: Path) -> None:
+    permitted = Permitted(tmp_path)
+    permitted.verdict()
+    permitted.first.said = Doubt.STICKS_MOVED
+    assert permitted.verdict() is Reaction.HOLD
+    permitted.verdict(20.0)
+    assert permitted.run.held_for == Reason(Doubt.STICKS_MOVED)
 
 
 def test_the_leg_begins_afresh_at_each_change_and_not_between(tmp_path: Path) -> None:

@@ -15,8 +15,17 @@ from companion.control.controller import ControlCommand, Purpose
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
 from companion.core.scan import RangeScan
-from companion.executive.mission_progress import TargetStatus
+from companion.executive.mission_progress import (
+    MissionProgress,
+    TargetStatus,
+    on_reached,
+    on_time,
+    on_unreachable,
+    parked,
+    plan_progress,
+)
 from companion.mission.bounds import Bound
+from companion.mission.mission import OnBlocked
 from companion.navigation.field_step import Action
 from companion.safety.mode_latch import Control
 from companion.safety.reasons import (
@@ -46,8 +55,10 @@ from companion.viewer.frame import (
     _thinned,
     doing_of,
     mode_of,
+    statuses_of,
     told,
 )
+from tests.companion.executive.test_mission_progress import target
 
 
 def test_an_outline_is_a_polygon_ahead_and_to_the_right() -> None:
@@ -109,6 +120,8 @@ ROLLS, PILOT = {"forward_m_s": 1.0}, {"mode": RoverMode.MANUAL}
 RESTARTED = replace(BLINDED, reason=Reason(LatchReason.RESTARTED))
 TAKEN = {"taken_over": True}
 SHED = {"shed": TargetStatus.UNREACHABLE}
+SILENT = {"held_for": Reason(Doubt.DATA_OLD, ("autopilot", 24))}
+HELD_FOR = "it had stopped: autopilot silent for over 24 s (the companion asked for HOLD)"
 
 
 @pytest.mark.parametrize(
@@ -117,6 +130,7 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         (DRIVING, {}, "driving to gate", ""),
         (DRIVING, {"action": Action.BACKTRACK}, "going back to find another way to gate", ""),
         (DRIVING, {"makes_way": True}, "driving to gate", "making way for something that moves"),
+        (DRIVING, {"tries_again": True}, "driving to gate", "trying again: the way was blocked"),
         (DRIVING, {"broken_off": LOW}, "driving to gate", "battery low for the autopilot"),
         (DRIVING, {"broken_off": LOW, "makes_way": True}, "driving to gate", f"{LOW}; {MAKES_WAY}"),
         (DRIVING, {"rerouted": "a better path"}, "driving to gate", "a better path"),
@@ -132,6 +146,7 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
         (BLINDED, {}, "stopped: range data silent for over 1 s", "waiting for good data and a person to set X"),
         (RESTARTED, {}, "stopped: autopilot restarted, rover disarmed", f"waiting for {BLIND}"),
         (HELD, TAKEN, f"stopped: HOLD was set by {SOMEBODY}", "waiting for a person to set X"),
+        (HELD, SILENT, "stopped: mode is not GUIDED", f"{HELD_FOR}; waiting for a person to set X"),
         (HELD, {**PILOT, **TAKEN}, "the pilot drives (MANUAL)", "waiting for a person to set X"),
         (HELD, PILOT, "the pilot drives (MANUAL)", "waiting for a person to set X"),
         (DOUBTED, {}, "stopped: position wanders", ""),
@@ -151,7 +166,19 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
             "ended early, battery low for the autopilot: 1 of 2 targets reached",
             "shed: unreachable",
         ),
-        (NOBODY, {}, "ended, nobody is here to do what the companion waits for", ""),
+        (
+            NOBODY,
+            {**SILENT, "before": HELD, "shed": TargetStatus.PENDING, "parting": STILL_ARMED},
+            "ended, nobody is here: 1 of 2 targets reached",
+            f"it waited for a person to set X; {HELD_FOR}; shed: not reached; the rover was left armed, in HOLD",
+        ),
+        (
+            NOBODY,
+            {**TAKEN, "before": HELD},
+            "ended, nobody is here",
+            f"it waited for a person to set X; it had stopped: HOLD was set by {SOMEBODY}",
+        ),
+        (NOBODY, {"before": WAITING}, "ended, nobody is here", f"it waited for {WAITING.awaited}"),
         (BY_USER, {"shed": TargetStatus.PENDING}, "stopped by the user: 1 of 2 targets reached", "shed: not reached"),
     ],
 )
@@ -164,19 +191,88 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
     )  # fmt: skip
     run = SimpleNamespace(
         stop=SimpleNamespace(reason=activity.reason), latch=SimpleNamespace(control=Control.PERSON),
-        taken_over=given.get("taken_over", False), start_paused=given.get("start_paused", False),
+        taken_over=given.get("taken_over", False), held_for=given.get("held_for"),
+        under_way=given.get("before"), start_paused=given.get("start_paused", False),
     )  # fmt: skip
     statuses = [("gate", TargetStatus.REACHED), *((name, given[name]) for name in ("shed",) if name in given)]
     companion = SimpleNamespace(
         outcome=SimpleNamespace(broken_off=given.get("broken_off")), mission_run=run, vehicle=vehicle,
         statuses=lambda: statuses, parting=given.get("parting"),
-        executor=SimpleNamespace(driver=SimpleNamespace(makes_way=given.get("makes_way"))),
+        executor=SimpleNamespace(
+            driver=SimpleNamespace(makes_way=given.get("makes_way")),
+            progress=SimpleNamespace(tries_again=given.get("tries_again", False)),
+        ),
     )  # fmt: skip
     decision = SimpleNamespace(action=given.get("action", Action.FOLLOW))
     status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=decision)
-    headway = SimpleNamespace(line=given.get("held_up", ""), rerouted=given.get("rerouted", ""))
+    headway = SimpleNamespace(
+        line=given.get("held_up", ""), rerouted=given.get("rerouted", ""), stands_for_others=False
+    )
     doing = doing_of(cast(Any, companion), cast(Any, status), cast(Any, headway))
     assert (doing["line"], doing["why"]) == (line, why)
+
+
+def test_one_that_stands_to_make_way_is_shown_as_waiting() -> None:
+    companion = SimpleNamespace(
+        outcome=SimpleNamespace(broken_off=None), mission_run=SimpleNamespace(stop=None), executor=None
+    )
+    status = SimpleNamespace(activity=DRIVING, target="gate", doing="driving", decision=None)
+    for stands, state in ((True, "waiting"), (False, "driving")):
+        headway = SimpleNamespace(line=MAKES_WAY, rerouted="", stands_for_others=stands)
+        doing = doing_of(cast(Any, companion), cast(Any, status), cast(Any, headway))
+        assert (doing["line"], doing["state"]) == (MAKES_WAY, state)
+
+
+TO_B = plan_progress((target("a", OnBlocked.WAIT, 30.0), target("b")), target("start"))
+AT_A = on_reached(TO_B, 100.0)
+BLOCKED = on_unreachable(TO_B, 100.0, 5.0, 600.0)
+SHORTLY = replace(AT_A, index=1, statuses=(TargetStatus.REACHED,) * 2, until_s=math.inf)
+LATER = replace(BLOCKED, until_s=165.0)
+
+
+@pytest.mark.parametrize(
+    ("phase", "progress", "line", "why"),
+    [
+        (RunPhase.STAYING, AT_A, "staying at a", "for 20 s more; next: b"),
+        (RunPhase.STAYING, replace(AT_A, until_s=90.0), "staying at a", "next: b"),
+        (RunPhase.STAYING, SHORTLY, "staying at b", "it is the last target"),
+        (RunPhase.STAYING, TO_B, "staying here for the mission's commands", "next: a"),
+        (RunPhase.STAYING, parked(TO_B), "staying where it is", ""),
+        (
+            RunPhase.WAY_BLOCKED,
+            BLOCKED,
+            "waiting for the way to a to clear",
+            "blocked for 10 s, tries again in 0 s, gives up in 10 min",
+        ),
+        (
+            RunPhase.WAY_BLOCKED,
+            replace(LATER, give_up_s=None),
+            "waiting for the way to a to clear",
+            "tries again in 55 s",
+        ),
+    ],
+)
+def test_one_that_waits_says_where_for_how_long_and_what_comes_then(
+    phase: RunPhase, progress: MissionProgress, line: str, why: str
+) -> None:
+    since_s = None if progress.give_up_s is None else progress.give_up_s - 600.0
+    executor = SimpleNamespace(progress=progress, phase=phase, blocked_since_s=since_s)
+    companion = SimpleNamespace(executor=executor, mission_run=SimpleNamespace(stop=None))
+    status = SimpleNamespace(activity=Activity(phase), target="a", doing="", time_s=110.0)
+    doing = doing_of(cast(Any, companion), cast(Any, status))
+    assert (doing["line"], doing["why"], doing["state"]) == (line, why, "waiting")
+
+
+def test_a_target_that_is_tried_again_is_no_failure_until_the_run_has_ended() -> None:
+    tried, given_up = on_time(BLOCKED, 105.0), on_unreachable(on_time(BLOCKED, 105.0), 700.0, 5.0, 600.0)
+    shown = [
+        statuses_of(cast(Any, SimpleNamespace(
+            statuses=lambda progress=progress: [("", status) for status in progress.statuses],
+            executor=SimpleNamespace(progress=progress), end=end,
+        )))[0]
+        for progress, end in ((BLOCKED, None), (tried, None), (given_up, None), (BLOCKED, DONE.reason))
+    ]  # fmt: skip
+    assert shown == ["waiting", "pending", "unreachable", "unreachable"]
 
 
 def test_a_rover_that_was_given_up_in_doubt_is_driven_by_nobody() -> None:

@@ -21,7 +21,7 @@ from tests.support.rig import yard
 @pytest.mark.parametrize(
     ("asked", "line"),
     [
-        (EndReason.NOBODY_HERE, "ended, nobody is here to do what the companion waits for"),
+        (EndReason.NOBODY_HERE, "ended, nobody is here"),
         (EndReason.NEVER_BEGINS, "ended, connecting since the start; it cannot be expected any more"),
         (EndReason.STOPPED_BY_USER, "stopped by the user"),
         (None, "ended, time limit reached"),
