@@ -22,20 +22,32 @@ Colour = tuple[int, int, int]
 OBSTACLE_COLOUR = (40, 44, 52)
 PATH_COLOUR, CURVE_COLOUR, TIGHT_COLOUR = (214, 60, 50), (40, 110, 200), (170, 0, 170)
 START_COLOUR, TARGET_COLOUR = (30, 150, 80), (240, 140, 20)
+HEADING_COLOUR = (0, 90, 40)
+ARROW_SHARE = 12.0
+"""The arrow of a heading is as long as one of so many parts of the longer side."""
 
 
 def save_plan(
-    file: Path, grid: Grid, ends: tuple[Cell, Cell], path: GridPath | None, tight: Places, title: str
+    file: Path,
+    grid: Grid,
+    ends: tuple[Cell, Cell],
+    path: GridPath | None,
+    tight: Places,
+    title: str,
+    heading: tuple[float, str] | None = None,
 ) -> None:
     """Write an image of a path from one end to the other; the suffix decides the format. Raises OutputError.
 
     The map in greys (darker is costlier), framed on the path. ``tight``: places in fields, shape (n, 2), where the
-    rover could not follow it.
+    rover could not follow it. ``heading``: of the rover at the start, in radians from east to
+    north, and what to say of it.
     """
     start, target = (np.array([(end.x, end.y)], np.float64) for end in ends)
     cells = np.empty((0, 2)) if path is None else path.cell_array.astype(np.float64)
     lines = (start, target, cells, tight, *([] if path is None or path.curve is None else [path.curve]))
-    figure = MapFigure(framed(*(grid.places_of(line) for line in lines)))
+    seen = [grid.places_of(line) for line in lines]
+    arrow = None if heading is None else _along(framed(*seen), seen[0], heading[0])
+    figure = MapFigure(framed(*seen, *([] if arrow is None else [arrow])))
     _show(figure, _shaded(grid), extent_of(grid))
     ground = ((OBSTACLE_COLOUR, "obstacle"), (FREE_COLOUR, "free (darker is costlier)"))
     for colour, label in ((START_COLOUR, "start"), (TARGET_COLOUR, "target"), *ground):
@@ -48,6 +60,8 @@ def save_plan(
             figure.key(_rgb(CURVE_COLOUR), "its smooth curve")
     for end, colour in ((start, START_COLOUR), (target, TARGET_COLOUR)):
         _dots(figure, grid.places_of(end), colour)
+    if heading is not None and arrow is not None:
+        _arrow(figure, arrow, heading[1])
     if len(tight):
         _rings(figure, grid.places_of(tight), f"bends more sharply than the rover turns ({len(tight)})")
     with replaced(file) as new:
@@ -158,6 +172,20 @@ def _line(figure: MapFigure, places: Places, colour: Colour, width: float) -> No
 
 def _dots(figure: MapFigure, places: Places, colour: Colour) -> None:
     figure.axes.plot(places[:, 1], places[:, 0], "o", color=_rgb(colour), markersize=10, zorder=5)
+
+
+def _along(ground: Extent, place: Places, heading_rad: float) -> Places:
+    """From a place along a heading, counted from east to north; long enough to be seen."""
+    long_m = max(ground.width_m, ground.height_m) / ARROW_SHARE
+    tip = place + long_m * np.array([(math.sin(heading_rad), math.cos(heading_rad))])
+    return np.concatenate((place, tip))
+
+
+def _arrow(figure: MapFigure, ends: Places, label: str) -> None:
+    tail, tip = ((east_m, north_m) for north_m, east_m in ends.tolist())
+    style = {"arrowstyle": "-|>,head_width=0.5,head_length=0.9", "color": _rgb(HEADING_COLOUR), "linewidth": 3.0}
+    figure.axes.annotate("", tip, tail, arrowprops={**style, "shrinkA": 0, "shrinkB": 0}, zorder=7)
+    figure.key(_rgb(HEADING_COLOUR), label)
 
 
 def _rings(figure: MapFigure, places: Places, label: str) -> None:

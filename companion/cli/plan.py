@@ -164,12 +164,26 @@ def _lengths(answer: Answer, path: GridPath) -> dict[str, str]:
     if radius_m > 0.0:
         rows["sharpest bend"] = "none" if bend_m is None else f"{bend_m:.2f} m radius"
         rows["too tight"] = _too_tight(len(answer.tight))
-    heading_rad = answer.kinematics.heading_rad
-    if heading_rad is not None and len(line) > 1:
-        off_deg = math.degrees(abs(math.remainder(bearing_of(line) - heading_rad, 2.0 * math.pi)))
-        ahead = off_deg <= AHEAD_DEG
-        rows["sets out"] = "ahead" if ahead else f"{off_deg:.0f} deg off its heading: the rover would manoeuvre first"
+    if sets_out := _sets_out(answer):
+        rows["sets out"] = sets_out
     return rows
+
+
+def _sets_out(answer: Answer) -> str:
+    """How far off the rover's heading the path begins; empty without heading or path."""
+    heading_rad, path = answer.kinematics.heading_rad, answer.result.path
+    line = None if path is None else line_of(path)
+    if heading_rad is None or line is None or len(line) < 2:
+        return ""
+    off_deg = math.degrees(abs(math.remainder(bearing_of(line) - heading_rad, 2.0 * math.pi)))
+    return "ahead" if off_deg <= AHEAD_DEG else f"{off_deg:.0f} deg off its heading: the rover would manoeuvre first"
+
+
+def _heading(answer: Answer) -> tuple[float, str] | None:
+    """The heading at the start, and what the picture says of it; None where any will do."""
+    heading_rad, sets_out = answer.kinematics.heading_rad, _sets_out(answer)
+    told = f"heading at the start; it sets out {sets_out}" if sets_out else "heading at the start"
+    return None if heading_rad is None else (heading_rad, told)
 
 
 def _too_tight(bends: int) -> str:
@@ -238,7 +252,8 @@ def plan(
         answer = search(grid, problem, name, settings, seed, top_left)
         if image is not None:
             title = f"{map_file.name}, planned by {answer.result.planner}: {STATUS_WORDS[answer.result.status]}"
-            save_plan(image, grid, (problem.start, problem.target), answer.result.path, answer.tight, title)
+            ends = (problem.start, problem.target)
+            save_plan(image, grid, ends, answer.result.path, answer.tight, title, _heading(answer))
     except (SettingsError, MapError, PlaceError, TurningError, UnknownPlannerError, OwnPartError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error

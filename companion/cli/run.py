@@ -14,6 +14,7 @@ from rich.console import Console
 
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
+from companion.cli.arming_advice import ArmingAdvice
 from companion.cli.ending import ended, print_statuses
 from companion.cli.entry import EXIT_STOPPED
 from companion.cli.given import RadiusM, ResolutionM, SpeedMS
@@ -250,10 +251,12 @@ def _drive(rig: Rig, *, seed: int, arm: bool) -> int:
         rig.live.follow(companion)
 
     strange = StrangePort(rig.link.description, lambda text: rig.live.tell(text, Severity.WARNING))
+    advice = ArmingAdvice(lambda text: rig.live.tell(text, Severity.NOTICE))
 
     def show(status: Status) -> None:
         strange.look(status.time_s, rig.autopilot.codec.strange)
         rig.live.show(status)
+        advice.look(status.activity)
         service.show(status)
         if rig.page is not None:
             rig.page.show(status)

@@ -121,6 +121,7 @@ def frame_of(companion: Companion, status: Status, headway: Headway | None = Non
         **mode_of(vehicle, run),
         **doing_of(companion, status, headway),
         "held_up": "" if headway is None else headway.line,
+        "makes_way": headway is not None and headway.stands_for_others,
         "statuses": statuses_of(run),
         "goal": _goal(executor),
         "path": _path(executor),
@@ -256,14 +257,14 @@ def _driving(companion: Companion, status: Status, headway: Headway | None) -> t
     line = f"going back to find another way to {status.target}" if goes_back else f"driving to {status.target}"
     early = companion.outcome.broken_off
     why = [] if early is None else [str(early)]
-    if headway is not None and headway.line:
-        return headway.line, SEPARATOR.join(why)
-    if companion.executor is not None and companion.executor.progress.tries_again:
-        why.append(AGAIN)
+    if headway is not None and (doing := headway.doing(status.target)):
+        return doing, SEPARATOR.join(why)
     if companion.executor is not None and companion.executor.driver.makes_way:
         why.append(MAKES_WAY)
     if headway is not None and headway.rerouted:
         why.append(headway.rerouted)
+    if not why and companion.executor is not None and companion.executor.progress.tries_again:
+        why.append(AGAIN)
     return line, SEPARATOR.join(why)
 
 

@@ -57,7 +57,7 @@ class Headway:
         self.rerouted = ""
         """Why it has just taken another way, in words; empty where it has not."""
         self.stands_for_others = False
-        """Whether it stands now, because something moves."""
+        """Whether it stands now, because something moves: that is no hindrance yet, but what it does."""
         self._stands_since_s: float | None = None
         self._decision: Decision | None = None
         self._target = ""
@@ -70,11 +70,13 @@ class Headway:
     def note(self, companion: Companion, status: Status) -> None:
         """To be called after each tick."""
         before, self.hindrance = self.hindrance, self._look(companion, status)
-        where = " to" if self.hindrance is Hindrance.STUCK else ", heading for"
-        self.line = "" if self.hindrance is None else f"{self.hindrance.value}{where} {status.target}"
+        self.line = "" if self.hindrance is None else _line(self.hindrance, status.target)
         self.begins = self.hindrance not in (None, before)
-        self.stands_for_others = self.hindrance is Hindrance.MAKES_WAY and self._stands_since_s is not None
         self._note_decision(status)
+
+    def doing(self, target: str) -> str:
+        """What it does in place of driving; empty where it drives."""
+        return self.line or (_line(Hindrance.MAKES_WAY, target) if self.stands_for_others else "")
 
     def _note_decision(self, status: Status) -> None:
         """A decision stands until the rover enters the next field; its reason is told for longer.
@@ -93,7 +95,7 @@ class Headway:
     def _look(self, companion: Companion, status: Status) -> Hindrance | None:
         driver, pose = companion.driver, status.pose
         if driver is None or pose is None or status.activity.phase is not RunPhase.DRIVING or not status.target:
-            self._centres, self._stuck, self._stands_since_s = {}, None, None
+            self._centres, self._stuck, self._stands_since_s, self.stands_for_others = {}, None, None, False
             return None
         if abs(companion.vehicle.forward_m_s) > STANDS_M_S:
             self._stands_since_s = None
@@ -103,12 +105,13 @@ class Headway:
             self._stuck = driver.tally.stuck
         if driver.makes_way:
             self._made_way_s = status.time_s
+        made_way = status.time_s - self._made_way_s <= MADE_WAY_S
+        since_s = self._stands_since_s
+        self.stands_for_others = made_way and since_s is not None and status.time_s - since_s >= STOOD_S
         if driver.tally.stuck > self._stuck:
             self._centres = {}
             return Hindrance.STUCK
-        made_way = status.time_s - self._made_way_s <= MADE_WAY_S
-        stood = self._stands_since_s is not None and status.time_s - self._stands_since_s >= STOOD_S
-        if not (made_way and stood) and not self._lingers(pose, status.time_s, YIELDS if made_way else CIRCLES):
+        if not self._lingers(pose, status.time_s, YIELDS if made_way else CIRCLES):
             return None
         return Hindrance.MAKES_WAY if made_way else Hindrance.HARDLY
 
@@ -119,3 +122,8 @@ class Headway:
             if centre is None or pose.point.distance_m(centre.point) >= radius_m:
                 self._centres[radius_m] = pose
         return any(time_s - self._centres[radius_m].time_s >= limit_s for radius_m, limit_s in circles)
+
+
+def _line(hindrance: Hindrance, target: str) -> str:
+    where = " to" if hindrance is Hindrance.STUCK else ", heading for"
+    return f"{hindrance.value}{where} {target}"

@@ -136,7 +136,8 @@ class RunTally(ReplayObserver):
         hindrance = self._headway.hindrance
         held_up = "" if hindrance is None else hindrance.value
         name = doing["line"].replace("stopping: ", "stopped: ", 1)
-        self._stood.note(held_up or (name if doing["state"] in STOOD else ""), time_s, step_s)
+        stood = doing["state"] in STOOD and not self._headway.stands_for_others  # which is no hindrance for a moment
+        self._stood.note(held_up or (name if stood else ""), time_s, step_s)
         self._doubted.note(_doubt(companion), time_s, step_s)
         stopped = doing["state"] == "stopped" or phase is RunPhase.WAY_BLOCKED
         self.stops += stopped and not self._stopped

@@ -114,7 +114,7 @@ class DriveView:
             # After a reboot the autopilot's origin is where it rebooted, and so is the companion's.
             north_m, east_m = self._run.scenario.start.place_of(companion.origin)
             layers += known_layers(evidence, north_m, east_m)
-            places += target_places(progress, north_m, east_m)
+            places += target_places(progress, north_m, east_m, ended=companion.done)
             sketch = replace(sketch, path=path_ahead(companion, north_m, east_m))
         return replace(sketch, layers=layers, places=tuple(places))
 

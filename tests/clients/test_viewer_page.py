@@ -7,6 +7,7 @@ import re
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -33,7 +34,7 @@ return [...document.querySelectorAll('body *')].filter(one => one.checkVisibilit
     .map(one => `${one.className}: ${one.textContent.slice(0, 60)}`)
 """
 ORDER = """
-return ['.stage', '.readouts', '.facts-section', '.targets-section', '.news-section', '.charts']
+return ['.stage', '.readouts', '.news-section', '.targets-section', '.facts-section', '.charts']
     .map(name => document.querySelector(name).getBoundingClientRect().top)
 """
 """How far down the parts of the page are."""
@@ -84,6 +85,8 @@ SEEK = (
     "const s = document.querySelector('input[type=range]'); s.value = +s.max * arguments[0];"
     "s.dispatchEvent(new Event('input', {bubbles: true}))"
 )
+OLD_S = 2.0
+"""Data of a run that goes on counts as old after less than this."""
 PRESSED = "return [...document.querySelectorAll('.map-buttons [aria-pressed=true]')].map(b => b.innerText.trim())"
 """Buttons over the map that are pressed."""
 
@@ -143,6 +146,25 @@ return [...document.querySelectorAll('.fact')].filter(one =>
     .map(one => one.querySelector('dt').textContent)
 """
 """Facts that are shown as old."""
+
+
+PRESS_LAST = """
+const panel = document.querySelector('.panel');
+panel.scrollTop = panel.scrollHeight;
+const row = [...document.querySelectorAll('.decision-list li button:not(.more)')].at(-1);
+row.scrollIntoView();
+row.click();
+return row.innerText
+"""
+"""Presses the last decision that is listed, far down the panel."""
+IN_VIEW = """
+const {top, bottom} = document.querySelector('.panel').getBoundingClientRect();
+const low = document.querySelector('.tabs').getBoundingClientRect().bottom;
+return [...document.querySelectorAll('.why-decision h2, .why-decision .reason')].filter(one =>
+    one.getBoundingClientRect().top >= Math.max(top, low) && one.getBoundingClientRect().bottom <= bottom)
+    .map(one => one.innerText.replace(/:.*/, ''))
+"""
+"""What of a decision's number and reason can be seen."""
 
 
 PILOT = """
@@ -256,8 +278,11 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows(f"Driving to {name}", "Skip target")
             assert "#" not in desktop.driver.current_url and "is needed" not in desktop.text
             program.child.send_signal(signal.SIGINT)
-            desktop.shows("Stopped by the user")
+            desktop.shows("Stopped by the user", "Facts, as of the end")
             program.ended()
+            time.sleep(OLD_S)
+            assert desktop.run("return document.querySelector('.viewer').className") == "viewer", "it is not grey"
+            assert desktop.run(STRUCK) == [], "what it came to is not old"
             port = address.rstrip("/").rpartition(":")[2]
             faults = tmp_path / "pilot.toml"
             faults.write_text(PILOT, encoding="utf-8")
@@ -434,6 +459,19 @@ def test_a_report_is_walked_through_by_clicks(report_file: Path) -> None:
             report.run("return getComputedStyle(document.querySelector('.viewer')).backgroundColor")
             == "rgb(10, 13, 16)"
         )
+        assert report.faults == []
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_a_decision_that_is_pressed_in_the_list_shows_its_why(report_file: Path, size: tuple[int, int]) -> None:
+    """However far down the list it stands, and though the list is built anew around it."""
+    with page(size) as report:
+        report.open(report_file.as_uri())
+        report.press("Decisions")
+        report.run(SEEK, 0.6)
+        told = report.run(PRESS_LAST)
+        number, reason = re.fullmatch(r".*?\d:\d\d\s*(\d+)\s*\w+: (.*)", told, re.DOTALL).groups()
+        report.until(lambda: report.run(IN_VIEW) == [f"Decision {number}", reason])
         assert report.faults == []
 
 

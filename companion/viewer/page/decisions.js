@@ -140,13 +140,19 @@ export class Decisions {
     return [make("li", {}, make("button", { type: "button", class: "more", onclick: go }, text))];
   }
 
+  /** Goes to a decision whose row was pressed, and shows its why: on a phone it stands far above the list. */
+  choose(decision) {
+    this.jump(decision.t);
+    this.why.scrollIntoView({ block: "start" });
+  }
+
   row(decision) {
     return make(
       "li",
       {},
       make(
         "button",
-        { type: "button", onclick: () => this.jump(decision.t) },
+        { type: "button", onclick: () => this.choose(decision) },
         make("time", {}, clock(decision.t, this.record.scene)),
         make("b", {}, decision.number),
         make("span", {}, `${decision.action}: ${decision.reason}`),

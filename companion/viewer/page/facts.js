@@ -8,20 +8,16 @@ const OLD_HEARTBEAT_S = 3;
 const LOST_HEARTBEAT_S = 6;
 const SLOW_HZ = 1;
 const LOW_PERCENT = 20;
-const ROLLS_M_S = 0.05;
 
 /** Facts that say nothing any more when it is not known where the rover is. */
 export const OF_PLACE = new Set(["Goal", "Setpoint", "Position"]);
 
-/** The three large numbers: [name, value, unit]. */
+/** The three large numbers: [name, value, unit]. At the end of a run there is no speed any more, and perhaps no goal. */
 export function readouts(frame) {
-  const speed = Math.abs(frame?.speed ?? NaN);
-  return [
-    // A run may end while the rover still rolls.
-    [frame?.state === "ended" && speed >= ROLLS_M_S ? "last speed" : "speed", number(speed), "m/s"],
-    howFar(frame),
-    ["mode", frame?.mode ?? UNKNOWN, ""],
-  ];
+  const mode = ["mode", frame?.mode ?? UNKNOWN, ""];
+  const far = howFar(frame);
+  if (frame?.state === "ended") return far[1] === UNKNOWN ? [mode] : [far, mode];
+  return [["speed", number(Math.abs(frame?.speed ?? NaN)), "m/s"], far, mode];
 }
 
 // To the goal; of a simulator, which knows none, how far the rover has come.
@@ -52,7 +48,7 @@ export function facts(frame) {
     ["GPS", gpsOf(frame.gps), gpsLevel(frame.gps)],
     ["Battery", batteryOf(frame.battery), batteryLevel(frame.battery)],
     ["Guard", { true: "on guard", false: "none heard" }[frame.guard] ?? "not asked", null],
-    ["Contacts", frame.contacts ?? UNKNOWN, frame.contacts > 0 ? "error" : null],
+    ["Collisions", frame.contacts ?? UNKNOWN, frame.contacts > 0 ? "error" : null],
     ["Decision", frame.decision ?? UNKNOWN, null],
     ["Tick", Number.isFinite(figures.tick_ms) ? `${number(figures.tick_ms)} ms` : UNKNOWN, null],
   ];
@@ -71,7 +67,7 @@ export function trueFacts(frame) {
     ["Clearance", clearanceOf(frame.figures?.clearance_m), null],
     ["GPS", gpsOf(frame.gps), gpsLevel(frame.gps)],
     ["Battery", batteryOf(frame.battery), batteryLevel(frame.battery)],
-    ["Contacts", frame.contacts ?? UNKNOWN, frame.contacts > 0 ? "error" : null],
+    ["Collisions", frame.contacts ?? UNKNOWN, frame.contacts > 0 ? "error" : null],
     ...links.map((link) => [link.name, packetsOf(link), link.heard ? null : "warning"]),
   ];
 }
@@ -101,7 +97,7 @@ function yesNo(value) {
 function goalOf(frame) {
   if (!frame.goal) return "none";
   return frame.pose
-    ? `${frame.goal.name}, ${metres(distance(frame.pose, frame.goal.place))} straight`
+    ? `${frame.goal.name}, ${metres(distance(frame.pose, frame.goal.place))} away`
     : frame.goal.name;
 }
 

@@ -84,13 +84,12 @@ function reached({ statuses = [] }) {
   return statuses.filter((status) => status === "reached").length;
 }
 
-// While driving the second line says how far it still is, after why it hurries home or makes way; when standing it says
-// why; in the end, what it came to.
+// While driving, or making way, the second line says how far it still is, after why it hurries home; when standing it
+// says why; in the end, what it came to.
 function reason(frame, state, scene) {
   if (!frame) return "";
   if (state === "ended") return cameTo(frame, scene?.targets ?? []);
-  if (state !== "driving" && frame.why) return sentence(frame.why);
-  if (state !== "driving") return "";
+  if (state !== "driving" && !frame.makes_way) return sentence(frame.why);
   return [sentence(frame.why), onTheWay(frame)].filter(Boolean).join(" · ");
 }
 
@@ -108,7 +107,7 @@ function onTheWay(frame) {
   const rest = wayLeft(frame);
   const way = Number.isFinite(rest)
     ? `${metres(rest)} to go`
-    : `${metres(distance(frame.pose, frame.goal.place))} straight`;
+    : `${metres(distance(frame.pose, frame.goal.place))} as the crow flies`;
   const turning = turningOnTheSpot(frame);
   return turning ? `${turning} · ${way}` : `${way} · ${number(Math.abs(frame.speed ?? NaN))} m/s`;
 }

@@ -3,7 +3,8 @@
 import { pathAhead, placed } from "viewer/geometry.js";
 
 /** The rover is never drawn smaller than this, however far away the map is seen from. */
-const SMALLEST_ROVER_PX = 26;
+const SMALLEST_ROVER_PX = 22;
+const SMALLEST_ROVER_DISC_PX = 13;
 /** A velocity is drawn as far as it leads in so long. */
 const TOLD_S = 1.5;
 const TOLD_STEP_S = 0.1;
@@ -142,7 +143,7 @@ export function drawRover(pen, scene, pose) {
     context.globalAlpha = 0.35;
     context.fill();
     context.globalAlpha = 1;
-  } else pen.disc(x, y, 17, colours.halo, colours.rover, 2);
+  } else pen.disc(x, y, SMALLEST_ROVER_DISC_PX, colours.halo, colours.rover, 2);
   const half = Math.min(Math.max(size * 0.42, SMALLEST_ROVER_PX / 2), 60);
   context.save();
   context.translate(x, y);

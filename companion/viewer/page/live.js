@@ -130,7 +130,7 @@ class LivePage {
     const trouble = this.trouble();
     const lost = isLost(frame);
     const old = frame !== null && this.silentFor() > STALE_MS;
-    const silent = trouble !== "" || old;
+    const silent = trouble !== "" || (old && frame.state !== "ended"); // what a run has come to stays true
     this.charts.stale = lost || silent;
     viewer.classList.toggle("stale", this.charts.stale);
     viewer.classList.toggle("lost", lost && !silent); // where it is, is old; mode and battery are not

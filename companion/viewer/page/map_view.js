@@ -21,6 +21,8 @@ export class MapView {
     this.above = [];
     /** Functions of other modules that give more places which "fit" keeps in view. */
     this.besides = [];
+    /** Boxes of the screen that are covered: no name stands there. */
+    this.taken = [];
     this.drawn = 0;
     camera.listeners.add(() => this.invalidate());
     model.listeners.add(() => this.invalidate());
@@ -62,7 +64,8 @@ export class MapView {
     const frame = model.frame;
     // These take their room first, so no name covers them.
     claimFrame(pen);
-    if (frame?.pose) pen.taken.push([...camera.toScreen(frame.pose[0], frame.pose[1]).map((at) => at - 16), 32, 32]);
+    pen.taken.push(...this.taken);
+    if (frame?.pose) pen.taken.push([...camera.toScreen(frame.pose[0], frame.pose[1]).map((at) => at - 14), 28, 28]);
     if (frame) claimMovers(pen, frame);
     for (const layer of this.below) layer(pen);
     camera.world(context);

@@ -30,13 +30,18 @@ export class Panel {
       // What is new is seen without scrolling, however many targets there are.
       make("section", { class: "news-section" }, make("h2", {}, "News"), this.news.node),
       (this.targetsSection = make("section", { class: "targets-section" }, this.targetsHead, this.asked, this.targets)),
-      make("section", { class: "facts-section" }, make("h2", {}, "Facts"), this.facts),
+      make("section", { class: "facts-section" }, (this.factsHead = make("h2")), this.facts),
     );
   }
 
   show() {
     const { frame, scene } = this.model;
-    readouts(frame).forEach(([name, value, unit], i) => this.numbers[i].set(name, value, unit));
+    const told = readouts(frame);
+    this.numbers.forEach((number, i) => {
+      number.node.hidden = i >= told.length;
+      if (i < told.length) number.set(...told[i]);
+    });
+    setText(this.factsHead, frame?.state === "ended" ? "Facts, as of the end" : "Facts");
     this.showFacts(scene?.truth ? trueFacts(frame) : facts(frame));
     this.showTargets();
     this.news.show();
@@ -71,15 +76,16 @@ export class Panel {
     let seen = false;
     targets.forEach((target, i) => {
       const status = frame?.statuses?.[i] ?? "pending";
-      const now = !ended && !seen && status === "pending" && frame?.goal?.name === target.name;
+      const open = status === "pending" || status === "waiting";
+      const now = !ended && !seen && open && frame?.goal?.name === target.name;
       seen ||= now;
       const row = this.targetRows[i];
       setAttribute(row.node, "data-kind", now ? "now" : kindOf(status));
       setIcon(row.sign, now ? "now" : ({ skipped: "skip" }[kindOf(status)] ?? kindOf(status)));
-      const ahead = frame?.state === "driving" ? "going there" : "next";
+      const ahead = status === "waiting" ? "waiting" : frame?.state === "driving" ? "going there" : "next";
       const missed = ended && status === "pending" ? "not reached" : status;
       setText(row.status, now ? ahead : scene.truth ? "" : missed); // a simulator does not know what became of them
-      setText(row.far, frame?.pose && status === "pending" ? metres(farTo(frame, target, now)) : "");
+      setText(row.far, frame?.pose && open ? metres(farTo(frame, target, now)) : "");
     });
     const known = `Targets, ${reached} of ${scene?.targets?.length} reached`;
     const first = frame?.goal?.asked === true && !ended;
@@ -121,7 +127,8 @@ function farTo(frame, target, now) {
 
 // Before the rover knows where it is, nobody knows where the targets are.
 function unplaced(count) {
-  return count ? `${count} ${count === 1 ? "target" : "targets"}, not on the map` : "No targets";
+  if (!count) return "No targets";
+  return count === 1 ? "1 target, its place is not known yet" : `${count} targets, their places are not known yet`;
 }
 
 function readout() {

@@ -135,6 +135,10 @@ function told({ t, what }) {
 // Whether somebody else drives the rover.
 const isLed = (frame) => !["nobody", "companion"].includes(frame.drives ?? "nobody");
 
+// Whether it stays where it has just arrived: that is told by the target's own mark.
+const isAtTarget = ({ goal, statuses = [] }, { targets = [] }) =>
+  targets.some(({ name }, k) => name === goal?.name && statuses[k] === "reached");
+
 /** Marks for the timeline: [t, kind, text], ordered by time. */
 function eventsOf(record) {
   const events = [];
@@ -149,7 +153,9 @@ function eventsOf(record) {
     });
     const stops = frame.state === "stopped" && before.state !== "stopped";
     const heldUp = Boolean(frame.held_up) && frame.held_up !== before.held_up;
-    if (stops || heldUp || (frame.state === "waiting" && before.state === "driving"))
+    const waits =
+      frame.state === "waiting" && before.state === "driving" && !frame.makes_way && !isAtTarget(frame, record.scene);
+    if (stops || heldUp || waits)
       events.push({
         t: frame.t,
         kind: "stop",

@@ -135,7 +135,8 @@ class ReportPage {
     this.parts.viewer.classList.toggle("stale", cut || silent !== "" || isLost(frame));
     this.parts.viewer.classList.toggle("lost", silent === "" && isLost(frame));
     const ending = "The record was cut short here: killed, power lost, or the disk full";
-    this.parts.headline.show(scene, frame, cut ? ending : silent);
+    const shown = frame && { ...frame, t: this.playback.t }; // the slider's time
+    this.parts.headline.show(scene, shown, cut ? ending : silent);
     this.panel.show();
     this.decisions.show(this.playback.t);
     this.charts.show();

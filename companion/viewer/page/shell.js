@@ -61,7 +61,13 @@ export function watchEdges({ bar, buttons, legend }, view) {
     buttons.style.bottom = `${view.camera.covered}px`;
     legend.node.style.maxHeight = `calc(100% - ${view.camera.covered + 24}px)`;
     // Their box may be wider than its columns, which stand at its right edge.
-    const left = Math.min(...[...buttons.children].map((button) => button.offsetLeft));
+    const boxOf = (one) => [one.offsetLeft, one.offsetTop, one.offsetWidth, one.offsetHeight];
+    const [x, y] = boxOf(buttons);
+    view.taken = [...buttons.children].map(boxOf).map(([left, top, ...size]) => [x + left, y + top, ...size]);
+    const lefts = [...buttons.children].map((button) => button.offsetLeft);
+    // One button or two in a column of their own, in a corner, leave the map beside them free.
+    const full = lefts.filter((one) => lefts.filter((other) => other === one).length > 2);
+    const left = Math.min(...(full.length ? full : lefts));
     view.camera.coveredRight = buttons.offsetWidth - left + 12;
     view.invalidate();
   };

@@ -59,11 +59,16 @@ def known_layers(
     )
 
 
-def target_places(progress: MissionProgress, north_m: float = 0.0, east_m: float = 0.0) -> tuple[Place, ...]:
-    """The targets, and what has become of them."""
+def target_places(
+    progress: MissionProgress, north_m: float = 0.0, east_m: float = 0.0, *, ended: bool = False
+) -> tuple[Place, ...]:
+    """The targets, and what has become of them; one that is tried again is not lost until the run has ended."""
+    states = [STATES[status] for status in progress.statuses]
+    if progress.tries_again and not ended:
+        states[progress.index] = PlaceState.PENDING
     return tuple(
-        Place(target.name, target.point.north_m + north_m, target.point.east_m + east_m, STATES[state])
-        for target, state in zip(progress.targets, progress.statuses, strict=True)
+        Place(target.name, target.point.north_m + north_m, target.point.east_m + east_m, state)
+        for target, state in zip(progress.targets, states, strict=True)
     )
 
 

@@ -84,7 +84,8 @@ class RunView:
         places: tuple[Place, ...] = ()
         if executor is not None:
             home = executor.progress.home.point
-            places = (Place("home", *_place(home), PlaceState.START), *target_places(executor.progress))
+            targets = target_places(executor.progress, ended=companion.done)
+            places = (Place("home", *_place(home), PlaceState.START), *targets)
         path, headline = path_ahead(companion), headline_of(companion, status, self._headway)
         sections = (self._rover_section(status), mission_section(companion, status), self._link_section(status))
         news, evidence, name = tuple(self._news), companion.evidence, self._name

@@ -78,7 +78,7 @@ def test_a_whole_drive_is_told_and_is_no_other_for_it() -> None:
     watched.show(run.take_status())
     assert [(p.north_m, p.east_m) for p in alone.run().track] == [(p.north_m, p.east_m) for p in report.track]
 
-    assert all(set(frame) == KEYS | {"held_up"} for frame in heard.frames)
+    assert all(set(frame) == KEYS | {"held_up", "makes_way"} for frame in heard.frames)
     states = list(dict.fromkeys(frame["state"] for frame in heard.frames))
     assert states == ["waiting", "driving", "ended"]
     last, driving = heard.frames[-1], [frame for frame in heard.frames if frame["state"] == "driving"]

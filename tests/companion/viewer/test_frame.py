@@ -205,9 +205,8 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
     )  # fmt: skip
     decision = SimpleNamespace(action=given.get("action", Action.FOLLOW))
     status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=decision)
-    headway = SimpleNamespace(
-        line=given.get("held_up", ""), rerouted=given.get("rerouted", ""), stands_for_others=False
-    )
+    held_up = given.get("held_up", "")
+    headway = SimpleNamespace(doing=lambda _: held_up, rerouted=given.get("rerouted", ""), stands_for_others=False)
     doing = doing_of(cast(Any, companion), cast(Any, status), cast(Any, headway))
     assert (doing["line"], doing["why"]) == (line, why)
 
@@ -218,7 +217,7 @@ def test_one_that_stands_to_make_way_is_shown_as_waiting() -> None:
     )
     status = SimpleNamespace(activity=DRIVING, target="gate", doing="driving", decision=None)
     for stands, state in ((True, "waiting"), (False, "driving")):
-        headway = SimpleNamespace(line=MAKES_WAY, rerouted="", stands_for_others=stands)
+        headway = SimpleNamespace(doing=lambda _: MAKES_WAY, rerouted="", stands_for_others=stands)
         doing = doing_of(cast(Any, companion), cast(Any, status), cast(Any, headway))
         assert (doing["line"], doing["state"]) == (MAKES_WAY, state)
 

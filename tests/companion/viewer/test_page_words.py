@@ -33,6 +33,7 @@ class Element {
   getAttribute(name) { return this.attributes[name] ?? null; }
   hasAttribute(name) { return name in this.attributes; }
   removeAttribute(name) { delete this.attributes[name]; }
+  scrollIntoView() {}
   addEventListener(name, call) { this[`on${name}`] = call; }
   get childElementCount() { return this.children.length; }
   get firstElementChild() { return this.children[0]; }
@@ -171,7 +172,8 @@ const moments = [
 tell(moments.map((one) => (headline.show({ live: true }, { ...frame, ...one }, "", true), headline.why.textContent)));
 """
     turning, driving = ["Turning to 052°", "Turning to 045°", "Turning left"], ["0.8 m/s", "0.0 m/s"]
-    whole = [f"{one} · 12.0 m straight" for one in turning] + [f"12.0 m straight · {one}" for one in driving]
+    far = "12.0 m as the crow flies"
+    whole = [f"{one} · {far}" for one in turning] + [f"{far} · {one}" for one in driving]
     assert ran(tmp_path, DOCUMENT + script) == whole
 
 
@@ -186,7 +188,7 @@ const moments = [{ setpoint: { kind: "heading", heading: -0.14 } }, { goal: null
 tell(moments.map((one) => (headline.show({ live: true }, { ...frame, ...one }, "", true), headline.why.textContent)));
 """
     turns, without, stopped = ran(tmp_path, DOCUMENT + script)
-    assert turns == "Battery at 18 % · Turning to 352° · 12.0 m straight"
+    assert turns == "Battery at 18 % · Turning to 352° · 12.0 m as the crow flies"
     assert without == stopped == "Battery at 18 %"
 
 
@@ -200,6 +202,53 @@ const frames = ["", "stuck", "stuck", "", "stuck"].map((held, t) => (
 tell(new Record({ scene: {}, frames }).events.map((one) => [one.t, one.kind, one.text, one.place]));
 """
     assert ran(tmp_path, script) == [[1, "stop", "stuck", [1, 0]], [4, "stop", "stuck", [4, 0]]]
+
+
+def test_a_stay_at_a_target_is_not_marked_as_a_stop(tmp_path: Path) -> None:
+    script = """
+globalThis.Path2D = class {};
+const { Record } = await import("./record.js");
+const scene = { targets: [{ name: "a", place: [0, 0] }, { name: "b", place: [9, 0] }] };
+const moments = [["driving", "pending"], ["waiting", "reached"], ["driving", "reached"], ["waiting", "reached"]];
+const frames = moments.map(([state, status], t) => (
+  { t, state, line: state, pose: [t, 0, 0], statuses: [status, "pending"], goal: { name: t < 2 ? "a" : "b" } }
+));
+tell(new Record({ scene, frames }).events.map((one) => [one.t, one.kind]));
+"""
+    assert ran(tmp_path, script) == [[1, "good"], [3, "stop"]]
+
+
+def test_a_target_that_is_tried_again_is_shown_as_waiting_and_then_as_under_way(tmp_path: Path) -> None:
+    script = """
+const { Panel } = await import("./panel.js");
+const scene = { targets: [{ name: "a", place: [0, 5] }, { name: "b", place: [0, 9] }] };
+const frame = { pose: [0, 0, 0], goal: { name: "a", place: [0, 5] } };
+const moments = [["waiting", "waiting"], ["driving", "pending"], ["ended", "unreachable"]];
+tell(moments.map(([state, status]) => {
+  const model = { scene, frame: { ...frame, state, statuses: [status, "pending"] }, news: [], newsCount: 0 };
+  const panel = new Panel(model, {});
+  panel.showTargets();
+  const { node, status: told, far } = panel.targetRows[0];
+  return [node.attributes["data-kind"], told.textContent, far.textContent];
+}));
+"""
+    waiting, driving, ended = ran(tmp_path, DOCUMENT + script)
+    assert waiting == ["now", "waiting", "5.0 m"] and driving == ["now", "going there", "5.0 m"]
+    assert ended == ["error", "unreachable", ""]
+
+
+def test_the_facts_of_a_run_that_has_ended_are_named_so(tmp_path: Path) -> None:
+    script = """
+const { Panel } = await import("./panel.js");
+const model = { scene: { targets: [] }, frame: { state: "driving" }, news: [], newsCount: 0 };
+const panel = new Panel(model, {});
+const shown = () => panel.numbers.filter((one) => !one.node.hidden).length;
+const look = () => (panel.show(), [panel.factsHead.textContent, shown()]);
+const before = look();
+model.frame = { state: "ended" };
+tell([before, look()]);
+"""
+    assert ran(tmp_path, DOCUMENT + script) == [["Facts", 3], ["Facts, as of the end", 1]]
 
 
 def test_the_mark_of_a_pilot_who_took_over_is_not_called_a_stop(tmp_path: Path) -> None:
@@ -267,20 +316,20 @@ tell([locked, resume.getAttribute("aria-disabled"), press(resume), press(pause),
     assert (pressed, paused, sent) == ("Go on: sent", "Pause: sent", ["resume", "pause"])
 
 
-def test_distances_and_the_last_speed_are_named_for_what_they_are(tmp_path: Path) -> None:
+def test_distances_are_named_for_what_they_are_and_a_run_that_has_ended_has_no_speed(tmp_path: Path) -> None:
     script = """
 const { readouts } = await import("./facts.js");
 const frame = { pose: [0, 0, 0], goal: { name: "X", place: [0, 12] }, path: [], speed: 0.4, state: "driving" };
 const path = [[0, 0], [5, 0], [5, 12], [0, 12]];
 const moments = [
-  {}, { path }, { state: "ended" }, { state: "ended", speed: -0.02 }, { goal: null }, { goal: null, driven_m: 88.34 },
+  {}, { path }, { state: "ended" }, { state: "ended", goal: null }, { goal: null }, { goal: null, driven_m: 88.34 },
 ];
 tell(moments.map((one) => readouts({ ...frame, ...one }).slice(0, 2).map((each) => each.join(" "))));
 """
-    straight, along, rolls, stands, without, simulator = ran(tmp_path, DOCUMENT + script)
+    straight, along, ended, home, without, simulator = ran(tmp_path, DOCUMENT + script)
     assert straight == ["speed 0.4 m/s", "straight 12.0 m"] and along[1] == "along path 22.0 m"
     assert (without[1], simulator[1]) == ("to goal – ", "driven 88.3 m")
-    assert (rolls[0], stands[0]) == ("last speed 0.4 m/s", "speed 0.0 m/s")
+    assert ended == ["straight 12.0 m", "mode – "] and home == ["mode – "]
 
 
 def test_a_link_without_positions_is_not_called_good(tmp_path: Path) -> None:
