@@ -9,6 +9,7 @@ from companion.cli.bends import tightest_radius, too_tight
 from companion.cli.commands import app
 from companion.cli.images import (
     CURVE_COLOUR,
+    HEADING_COLOUR,
     OBSTACLE_COLOUR,
     PATH_COLOUR,
     START_COLOUR,
@@ -198,6 +199,23 @@ def test_the_picture_is_north_up_and_shows_map_path_and_ends(map_file, tmp_path)
     for colour in (PATH_COLOUR, CURVE_COLOUR):
         middle(colour)
     assert f"picture: {file}" in result.stdout
+
+
+@pytest.mark.parametrize("heading_deg", [0, 90, 200])
+def test_the_heading_at_the_start_is_an_arrow_of_the_picture(tmp_path, heading_deg):
+    file = tmp_path / "heading.png"
+    ends = ("missions/maps/rooms.png", "--start", "3,24", "--target", "6,40", "--turning-radius-m", "1")
+    assert run(*ends, "--heading-deg", heading_deg, "--image", file).exit_code == 0
+    pixels = np.array(Image.open(file).convert("RGB"))[:-400]  # the legend is below
+
+    def middle(colour):
+        rows, columns = np.nonzero((pixels == colour).all(axis=2))
+        assert len(rows) > 50
+        return rows.mean(), columns.mean()
+
+    (down, right), (from_down, from_right) = middle(HEADING_COLOUR), middle(START_COLOUR)
+    drawn_deg = np.degrees(np.arctan2(right - from_right, from_down - down))
+    assert (drawn_deg - heading_deg + 180) % 360 - 180 == pytest.approx(0.0, abs=12.0)
 
 
 def test_where_the_rover_cannot_follow_is_marked_and_counted(tmp_path):
