@@ -6,8 +6,11 @@ import pytest
 from companion.core.frames import NedPoint
 from companion.core.grid import Cell, empty_grid
 from companion.mapping.evidence_map import new_map
+from companion.mission.mission import OnBlocked
 from companion.settings import Settings
-from companion.viewer.terminal.known import REACH_M, known_layers
+from companion.viewer.terminal.known import REACH_M, known_layers, target_places
+from companion.viewer.terminal.sketch import PlaceState
+from tests.companion.executive.test_mission_progress import blocked, progress
 
 
 @pytest.mark.parametrize("corner", [NedPoint(0.0, 0.0), NedPoint(-40.0, 17.5)])
@@ -30,3 +33,9 @@ def test_of_a_large_map_the_part_round_a_place_is_the_same_as_in_the_whole(corne
 def test_off_the_map_there_is_nothing() -> None:
     evidence = new_map(empty_grid(10, 10), 0.3, Settings().mapping)
     assert all(layer.where.size == 0 for layer in known_layers(evidence, around=NedPoint(5000.0, 0.0)))
+
+
+def test_a_target_that_is_tried_again_is_not_drawn_as_lost_until_the_run_has_ended() -> None:
+    waits, skips = blocked(progress(OnBlocked.WAIT)), blocked(progress(OnBlocked.SKIP))
+    assert target_places(waits)[0].state is PlaceState.PENDING
+    assert target_places(waits, ended=True)[0].state is target_places(skips)[0].state is PlaceState.LOST
