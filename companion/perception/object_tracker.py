@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -104,19 +105,20 @@ class Sighting:
         return TOGETHER_M if self.on_free_ground else ALONE_TOGETHER_M
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Track:
     """A thing over the last second."""
 
     number: int
     sightings: tuple[Sighting, ...]
 
+    @cached_property
     def estimate(self) -> tuple[Moving, bool] | None:
         """Its place and velocity by least squares, and whether they are significant; None if seen too briefly."""
         kind = self.sightings[-1].cut
-        return self._estimate(kind) or self._estimate(not kind)
+        return self._of_kind(kind) or self._of_kind(not kind)
 
-    def _estimate(self, cut: bool) -> tuple[Moving, bool] | None:
+    def _of_kind(self, cut: bool) -> tuple[Moving, bool] | None:
         """Of the sightings of one kind alone: else a thing that is only found otherwise seems to move."""
         sightings = [one for one in self.sightings if one.cut == cut]
         time_s = np.array([one.time_s for one in sightings])
@@ -168,7 +170,7 @@ class ObjectTracker:
         """What moves now."""
         found = []
         for track in self._tracks:
-            estimate = track.estimate()
+            estimate = track.estimate
             if estimate is not None and now_s - estimate[0].time_s <= HIDDEN_S:
                 moving, believed = estimate
                 if believed and moving.speed_m_s >= settings.moving_m_s:
@@ -180,7 +182,7 @@ class ObjectTracker:
         return any(
             len(track.sightings) >= DOUBTED_SIGHTINGS
             and pose.time_s - track.sightings[-1].time_s <= LOST_S
-            and track.estimate() is None
+            and track.estimate is None
             and _is_ahead(track.sightings[-1], pose)
             for track in self._tracks
         )
@@ -218,7 +220,7 @@ class ObjectTracker:
 
 def _expected(track: Track, time_s: float) -> tuple[float, float]:
     """Where the next sighting should be."""
-    estimate = track.estimate()
+    estimate = track.estimate
     last = track.sightings[-1]
     if estimate is None:
         return last.north_m, last.east_m

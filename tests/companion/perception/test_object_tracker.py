@@ -152,8 +152,8 @@ def test_corners_and_ends_of_walls_at_the_edge_of_the_view_do_not_move(speed_m_s
 
 def test_four_scans_are_enough_also_where_they_do_not_come_exactly_in_time() -> None:
     seen = tuple(Sighting(time_s, 5.0 + time_s, 3.0, 0.4, 0.0, 0.5, True) for time_s in (0.0, 0.1, 0.2, 0.2999))
-    assert Track(1, seen[:3]).estimate() is None
-    estimate = Track(1, seen).estimate()
+    assert Track(1, seen[:3]).estimate is None
+    estimate = Track(1, seen).estimate
     assert estimate is not None and estimate[1] and estimate[0].north_m_s == pytest.approx(1.0)
 
 
