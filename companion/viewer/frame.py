@@ -351,7 +351,9 @@ def _unattended(companion: Companion) -> str:
         return waited
     held_for = companion.mission_run.held_for
     stopped = _stopped(companion, activity)[0].removeprefix("stopped: ")
-    return f"{waited}{SEPARATOR}it had stopped: {stopped if held_for is None else f'{held_for} ({BY_COMPANION})'}"
+    if held_for is not None and (activity.reason is None or activity.reason.kind is not LatchReason.RESTARTED):
+        stopped = f"{held_for} ({BY_COMPANION})"
+    return f"{waited}{SEPARATOR}it had stopped: {stopped}"
 
 
 def end_of(companion: Companion, reason: Reason[Enum]) -> Json:

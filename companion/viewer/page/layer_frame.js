@@ -1,5 +1,6 @@
 // What belongs to the map as a picture: scale bar, north arrow, colours of speed.
 
+import { isLost } from "viewer/freshness.js";
 import { roundLength } from "viewer/layer_ground.js";
 import { number } from "viewer/words.js";
 
@@ -9,6 +10,8 @@ const LEFT = 16;
 const WIDTH = 290;
 /** The colours are so much higher where the buttons leave no room for both beside each other. */
 const ABOVE = 38;
+/** The north arrow, and what stands beside it, end here. */
+const BESIDE_NORTH = 62;
 
 /** Takes their room, so no name lies below them. */
 export function claimFrame(pen) {
@@ -49,6 +52,23 @@ export function drawNothingYet(pen, { frame, map, scene }) {
     const look = i ? { colour: colours.soft } : head;
     pen.text(line, x, y - 10 + 26 * i, { ...look, align: "center", halo: false });
   });
+}
+
+/** That the rover is not where the map shows it, or not on it at all, stands at the map's upper edge. */
+export function drawPlaceNote(pen, { frame, map, scene }) {
+  const nothing = !map.shape && !scene?.home;
+  if (!frame || scene?.truth || (nothing && !frame.pose)) return;
+  const unknown = frame.state === "ended" ? "The rover's place was never known" : "The rover's place is not known yet";
+  const note = frame.pose ? (isLost(frame) ? "Last known place: no position comes" : "") : unknown;
+  if (!note) return;
+  const { camera, colours } = pen;
+  const room = camera.width - camera.coveredRight - BESIDE_NORTH;
+  const usual = { size: 16, weight: 750 };
+  const size = usual.size * Math.min(1, Math.max(room - 40, 0) / pen.widthOf(note, usual));
+  const width = pen.widthOf(note, { ...usual, size }) + 24;
+  const x = BESIDE_NORTH + room / 2;
+  plate(pen, x - width / 2, 20, width, 32);
+  pen.text(note, x, 36, { ...usual, size, colour: colours.ink, align: "center", halo: false });
 }
 
 function plate(pen, left, top, width, height) {

@@ -3,7 +3,7 @@
 import { theme } from "viewer/colours.js";
 import { outermost } from "viewer/geometry.js";
 import { claimMovers, drawAhead, drawMovers, drawRays, drawRover } from "viewer/layer_drive.js";
-import { claimFrame, drawFrame, drawNothingYet } from "viewer/layer_frame.js";
+import { claimFrame, drawFrame, drawNothingYet, drawPlaceNote } from "viewer/layer_frame.js";
 import { drawBorders, drawGround } from "viewer/layer_ground.js";
 import { drawMarks, drawPointers } from "viewer/layer_marks.js";
 import { Pen } from "viewer/pen.js";
@@ -81,6 +81,7 @@ export class MapView {
     drawPointers(pen, frame);
     drawFrame(pen, model);
     drawNothingYet(pen, model);
+    drawPlaceNote(pen, model);
   }
 
   /** As far as the sensor sees; without it the rover alone would fill the map. */

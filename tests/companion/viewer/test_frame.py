@@ -178,6 +178,12 @@ HELD_FOR = "it had stopped: autopilot silent for over 24 s (the companion asked 
             "ended, nobody is here",
             f"it waited for a person to set X; it had stopped: HOLD was set by {SOMEBODY}",
         ),
+        (
+            NOBODY,
+            {**SILENT, "before": RESTARTED},
+            "ended, nobody is here",
+            f"it waited for {BLIND}; it had stopped: autopilot restarted, rover disarmed",
+        ),
         (NOBODY, {"before": WAITING}, "ended, nobody is here", f"it waited for {WAITING.awaited}"),
         (BY_USER, {"shed": TargetStatus.PENDING}, "stopped by the user: 1 of 2 targets reached", "shed: not reached"),
     ],

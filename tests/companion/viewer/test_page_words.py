@@ -141,6 +141,26 @@ tell([heads, drawn({ frame }), drawn({ frame: { state: "ended" } }), ...placed.m
     assert ended == ["The rover's place was never known"]
 
 
+def test_the_map_says_where_the_rover_is_not_known_or_no_position_comes(tmp_path: Path) -> None:
+    script = """
+const { drawPlaceNote } = await import("./layer_frame.js");
+const drawn = (frame, scene = { home: [0, 0] }) => {
+  const texts = [];
+  const context = { beginPath() {}, roundRect() {}, fill() {} };
+  const camera = { width: 400, height: 300, coveredRight: 60, covered: 0 };
+  const pen = { context, camera, colours: {}, widthOf: () => 100, text: (text) => texts.push(text) };
+  drawPlaceNote(pen, { frame, map: {}, scene });
+  return texts.join();
+};
+const pose = [0, 0, 0];
+const [fresh, old] = [0.1, 9].map((age) => ({ pose, rates: { position_age_s: age } }));
+tell([drawn({}), drawn({ state: "ended" }), drawn(old), drawn(fresh), drawn({}, {}), drawn(old, { truth: true })]);
+"""
+    unknown, never, last, *nothing = ran(tmp_path, DOCUMENT + script)
+    assert (unknown, never) == ("The rover's place is not known yet", "The rover's place was never known")
+    assert last == "Last known place: no position comes" and nothing == ["", "", ""]
+
+
 def test_only_what_is_fresh_is_called_live(tmp_path: Path) -> None:
     script = """
 const { Headline } = await import("./headline.js");
