@@ -137,12 +137,14 @@ def avoided(
     backwards: bool = False,
     foresees: Foresees | None = None,
     turned_stops: TurnedStops | None = None,
+    turned_rad_s: float = 0.0,
 ) -> Option:
     """What to do because of what moves, when the controller says ``command``; that command if nothing comes across.
 
     ``line``: what the rover is led along. ``aside_rad``: the bearing to which it moves aside already; it keeps to that.
     ``stops``: it stops already. ``backwards``: it rolls tail first. ``foresees``: where the rover will be with that
-    command, if it is known better than that it follows the line. ``turned_stops``: how else it may stop.
+    command, if it is known better than that it follows the line. ``turned_stops``: how else it may stop;
+    ``turned_rad_s``: it stops so already, and keeps to that side.
     """
     times_s = np.arange(0.0, view.settings.traffic.look_s + 1e-9, PERIOD_S)
     outlook = Outlook(view, times_s, backwards, stops)
@@ -166,6 +168,7 @@ def avoided(
             positions = (option for option in good if isinstance(option.command.setpoint, GuidedPosition))
             return next((one for one in positions if _may_be_the_last(one.command, view, discs)), good[0])
     turned = [Option(*way) for way in turned_stops(times_s)] if turned_stops is not None else []
+    turned = [option for option in turned if _turn_rad_s(option) * turned_rad_s > 0.0] or turned
     rooms_m = [room_m(option, HALF_MARGIN) for option in turned]
     if rooms_m and max(rooms_m) >= 0.0:
         return turned[int(np.argmax(rooms_m))]
@@ -195,6 +198,14 @@ def _least_bad(options: list[Option], outlook: Outlook, discs: Points, aside_rad
     return min((option for option, near in late if near.closing_m_s <= slowest_m_s + AS_SLOW_M_S), key=_told_m_s)
 
 
+def _turn_rad_s(option: Option) -> float:
+    """The turn rate with which the rover is told to stop; 0 where it is told something else."""
+    command = option.command
+    if command.purpose is not Purpose.BRAKE or not isinstance(command.setpoint, GuidedVelocity):
+        return 0.0
+    return command.setpoint.yaw_rate_rad_s
+
+
 def _told_m_s(option: Option) -> float:
     """The speed that is told; inf for a position, which tells the rover to go on."""
     setpoint = option.command.setpoint
@@ -221,6 +232,7 @@ class CollisionAvoidance:
     def __init__(self) -> None:
         self._aside_rad: float | None = None
         self._stops = False
+        self._turned_rad_s = 0.0
         self._since_s: float | None = None
 
     def avoid(
@@ -237,10 +249,11 @@ class CollisionAvoidance:
         """What to do, as ``avoided`` says."""
         option = avoided(
             command, line, view, moving, aside_rad=self._aside_rad, stops=self._stops, backwards=backwards,
-            foresees=foresees, turned_stops=turned_stops,
+            foresees=foresees, turned_stops=turned_stops, turned_rad_s=self._turned_rad_s,
         )  # fmt: skip
         self._aside_rad = option.aside_rad
         self._stops = option.yields and option.command.purpose is Purpose.BRAKE
+        self._turned_rad_s = _turn_rad_s(option) or (self._turned_rad_s if self._stops else 0.0)
         return option
 
     def is_patient(self, now_s: float, patience_s: float, *, yields: bool) -> bool:

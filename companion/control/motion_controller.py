@@ -148,7 +148,7 @@ class MotionController:
 
     def turned_stops(self, view: LocalView, times_s: Points) -> Iterator[tuple[ControlCommand, Points]]:
         """See ``Controller``: those that keep clear however much the rover turns."""
-        if self.choice is None or self.choice.time_s != view.pose.time_s:
+        if self.choice is None or self.choice.time_s != view.pose.time_s or view.speed_m_s <= STANDS_M_S:
             return
         turns_rad_s = BRAKE_TURNS[BRAKE_TURNS != 0.0] * self.choice.problem.model.turn_fastest_rad_s
         spares_m = _braking_spares_m(turns_rad_s, view, self._worst)

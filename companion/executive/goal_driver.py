@@ -48,8 +48,6 @@ from companion.planning.problem import PlanResult
 from companion.settings import ControllerKind
 
 DOUBT_REACH_M = 2.5
-WARY_S = 60.0
-"""Where something has moved, something else may come into view for so long."""
 NARROW_WITHIN_M, NARROW_ASIDE_M = 2.0, 0.3
 """A stuck rover takes for the cause the narrowest place so near ahead, if there is less room than this aside."""
 
@@ -97,7 +95,6 @@ class GoalDriver:
         self._planned_among: tuple[Moving, ...] = ()
         self._replanned_s = -math.inf
         self._avoidance = CollisionAvoidance()
-        self._wary_until_s = -math.inf
         self.makes_way = False
         """Whether something else than the path leads in this tick, because of what moves."""
 
@@ -194,12 +191,9 @@ class GoalDriver:
             decision = self.decision = Decision(Action.REACHED, Part.EXPLORE, (), None, DecisionReason.REACHED)
         return decision
 
-    def guide(self, view: LocalView, moving: tuple[Moving, ...] = (), *, doubtful: bool = False) -> ControlCommand:
-        """The command for this tick: along the path, and out of the way of what moves.
-
-        ``doubtful``: of something that has come into view it is not known yet whether it moves.
-        """
-        self.makes_way, command = False, self._follow(view, self._at_most_m_s(view, moving, doubtful))
+    def guide(self, view: LocalView, moving: tuple[Moving, ...] = ()) -> ControlCommand:
+        """The command for this tick: along the path, and out of the way of what moves."""
+        self.makes_way, command = False, self._follow(view)
         if not moving or (self.decision is not None and self.decision.action is Action.REACHED):
             return command
         command, yields = self._avoided(command, view, moving)
@@ -222,14 +216,7 @@ class GoalDriver:
         self.makes_way = option.yields
         return option.command, option.yields
 
-    def _at_most_m_s(self, view: LocalView, moving: tuple[Moving, ...], doubtful: bool) -> float:
-        """Where something moves, what has just come into view may, too: the rover slows down until that is known."""
-        traffic, now_s = view.settings.traffic, view.pose.time_s
-        if any(one.speed_m_s >= traffic.moving_m_s for one in moving):
-            self._wary_until_s = now_s + WARY_S
-        return traffic.wary_m_s if doubtful and now_s <= self._wary_until_s else math.inf
-
-    def _follow(self, view: LocalView, at_most_m_s: float) -> ControlCommand:
+    def _follow(self, view: LocalView) -> ControlCommand:
         """The command if nothing comes across: back out, follow the path, or stand where there is none."""
         if self._goal is None:
             return STANDSTILL
@@ -239,16 +226,16 @@ class GoalDriver:
             return STANDSTILL
         on_path = advanced(self.path, view.pose)
         self.path = rejoined(on_path, view.pose.point, view.evidence, view.rover.radius_m)
-        command = self._controller.follow(self.path, self._at_planned_speed(self.path, view, at_most_m_s))
+        command = self._controller.follow(self.path, self._at_planned_speed(self.path, view))
         if self._recovery.is_stuck(view, command):
             self._get_unstuck(view)
         return command
 
-    def _at_planned_speed(self, path: ReferencePath, view: LocalView, at_most_m_s: float) -> LocalView:
-        """The same moment, with the speed that is planned here, or the highest allowed, as cruise speed."""
+    def _at_planned_speed(self, path: ReferencePath, view: LocalView) -> LocalView:
+        """The same moment, with the speed that is planned here as cruise speed."""
         guidance, wanted_m_s = view.settings.guidance, self._fastest_m_s(view)
         planned_m_s = min(max(path.planned_m_s, guidance.min_speed_m_s), guidance.max_speed_m_s)
-        return view.with_speeds(min(wanted_m_s, planned_m_s, at_most_m_s), max(view.rover.cruise_speed_m_s, wanted_m_s))
+        return view.with_speeds(min(wanted_m_s, planned_m_s), max(view.rover.cruise_speed_m_s, wanted_m_s))
 
     def _field_step(self, view: LocalView, moving: tuple[Moving, ...]) -> Decision | None:
         """Start the navigator's step when a new field is entered or the path ahead is blocked; take its result."""

@@ -477,9 +477,7 @@ class MissionExecutor:
     def guide(self, task: MissionTask, view: LocalView) -> ControlCommand:
         """How to do now what was decided: the setpoint and the speed."""
         stands = task is MissionTask.STAND
-        if stands:
-            return self.driver.standing(view, self.moving)
-        return self.driver.guide(view, self.moving, doubtful=self._tracker.doubtful(view.pose))
+        return self.driver.standing(view, self.moving) if stands else self.driver.guide(view, self.moving)
 
     def learn(self, view: LocalView) -> None:
         """One more moment that may tell how the rover follows velocities. ``view`` knows what was told lately."""

@@ -38,8 +38,8 @@ WIDEST_M = 3.0
 WINDOW_S = 1.0
 LEAST_S, LEAST_SIGHTINGS = 0.28, 4
 """Four scans at 10 Hz, which do not come exactly 0.1 s apart."""
-DOUBTED_SIGHTINGS = 2
-"""One may be an echo of nothing."""
+CUT_SIGHTINGS = 5
+"""Of what the edge of the view cuts off, where the ground was never seen free: a trunk, seen by a rover that turns."""
 LOST_S, HIDDEN_S = 1.0, 3.0
 """A thing that is not found again is given up after so long: where it should be in view, and where it is not."""
 LEAST_RADIUS_M = 0.4
@@ -121,8 +121,10 @@ class Track:
     def _of_kind(self, cut: bool) -> tuple[Moving, bool] | None:
         """Of the sightings of one kind alone: else a thing that is only found otherwise seems to move."""
         sightings = [one for one in self.sightings if one.cut == cut]
+        on_free_ground = 2 * sum(one.on_free_ground for one in sightings) >= len(sightings)
+        least = CUT_SIGHTINGS if cut and not on_free_ground else LEAST_SIGHTINGS
         time_s = np.array([one.time_s for one in sightings])
-        if len(time_s) < LEAST_SIGHTINGS or time_s[-1] - time_s[0] < LEAST_S:
+        if len(time_s) < least or time_s[-1] - time_s[0] < LEAST_S:
             return None
         places = np.array([(one.north_m, one.east_m) for one in sightings])
         since = time_s - time_s.mean()
@@ -135,7 +137,6 @@ class Track:
         error_m_s = max(stray_m, 0.03) / math.sqrt(float(since @ since))
         north_m_s, east_m_s = (float(part) for part in velocity)
         moving = Moving(f"seen {self.number}", float(time_s[-1]), newest, north_m_s, east_m_s, radius_m)
-        on_free_ground = 2 * sum(one.on_free_ground for one in sightings) >= len(sightings)
         least_m_s = max(SURE * error_m_s, 0.0 if on_free_ground else ALONE_M_S)
         return moving, stray_m <= STRAY_M + blur_m and moving.speed_m_s >= least_m_s
 
@@ -177,16 +178,6 @@ class ObjectTracker:
                     found.append(moving)
         return tuple(found)
 
-    def doubtful(self, pose: Pose) -> bool:
-        """Whether something ahead has come into view of which is not known yet if it moves."""
-        return any(
-            len(track.sightings) >= DOUBTED_SIGHTINGS
-            and pose.time_s - track.sightings[-1].time_s <= LOST_S
-            and track.estimate is None
-            and _is_ahead(track.sightings[-1], pose)
-            for track in self._tracks
-        )
-
     def _window(self, pose: Pose, reach_m: float) -> tuple[slice, slice]:
         frame = self._evidence.frame
         x, y = frame.xy(pose.point)
@@ -226,11 +217,6 @@ def _expected(track: Track, time_s: float) -> tuple[float, float]:
         return last.north_m, last.east_m
     there = estimate[0].at(time_s)
     return there.north_m, there.east_m
-
-
-def _is_ahead(thing: Sighting, pose: Pose) -> bool:
-    to_n, to_e = thing.north_m - pose.north_m, thing.east_m - pose.east_m
-    return to_n * math.cos(pose.heading_rad) + to_e * math.sin(pose.heading_rad) > 0.0
 
 
 def _is_in_view(place: tuple[float, float], pose: Pose, scan: RangeScan) -> bool:

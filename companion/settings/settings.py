@@ -357,11 +357,6 @@ class TrafficSettings(Section):
     look_s: float = Field(8.0, gt=0.0, le=60.0, description="how far ahead the rover checks for crossing obstacles")
     margin_m: float = Field(0.4, ge=0.0, description="room between the rover and a moving obstacle")
     drift_m_s: float = Field(0.08, ge=0.0, description="growth of that room for each second ahead")
-    wary_m_s: float = Field(
-        1.0,
-        gt=0.0,
-        description="highest speed, where things move, until it is known if what has just come into view moves as well",
-    )
     patience_s: float = Field(
         30.0, gt=0.0, description="after yielding this long without progress the rover counts as stuck"
     )

@@ -233,6 +233,15 @@ def test_where_stopping_straight_on_would_touch_it_turns_off_while_it_stops() ->
 
     near, mirrored = crossing(2.1, -0.9, 22.9), crossing(-2.1, 0.9, 22.9)
     assert (told(near), told(mirrored)) == (ways[3], ways[0])
+    led, tells = CollisionAvoidance(), []
+    for moving in (near, mirrored, crossing(-3.0, 1.2), mirrored):
+        tells.append(
+            led.avoid(
+                on, PATH, view(1.9), (moving,), backwards=False, foresees=drives_on, turned_stops=turned_stops
+            ).command
+        )
+    stop = stop_for(Purpose.BRAKE)
+    assert tells[0] == ways[3] and tells[2] == stop and tells[1] in ways[2:] and tells[3] in ways[2:], "the same side"
     assert avoided(on, PATH, view(1.9), (near,), foresees=drives_on).command not in ways
     assert told(crossing(-3.0, 1.2)) == stop_for(Purpose.BRAKE)
 

@@ -369,7 +369,7 @@ def test_guidance_that_has_gone_mad_does_not_get_past_it(tmp_path: Path) -> None
     driver = rig.companion.driver
     assert driver is not None
     through = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(0.0, 7.0)), 2.0)
-    driver.guide = lambda *_, **__: through  # type: ignore[method-assign]
+    driver.guide = lambda *_: through  # type: ignore[method-assign]
     since_s = rig.now_s()
     rig.run_for(10.0)
     setpoints = [one for one in rig.sent_since(since_s) if one.is_setpoint]
@@ -470,7 +470,7 @@ def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path
     assert driver is not None and len(bounds) == 1
     rig.companion.mission_run.setpoint_check = SetpointCheck(rig.companion._notifier, (inside_borders,))
     out = ControlCommand(Purpose.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
-    driver.guide = lambda *_, **__: out  # type: ignore[method-assign]
+    driver.guide = lambda *_: out  # type: ignore[method-assign]
     rig.run_for(15.0)
     assert any("setpoint leads over the border of the autopilot's fence" in text for text in rig.texts())
     assert rig.simulator._vehicle.fence.count == 0 and rig.speed_m_s < 0.05

@@ -18,7 +18,6 @@ from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Decision, NavState
 from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import InlineRunner, StepCall, StepRunner, ThreadRunner
-from companion.perception.moving_obstacles import Moving
 from companion.planning.registry import make_planner
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity
@@ -178,24 +177,3 @@ def test_a_rover_faster_than_it_may_be_is_braked() -> None:
     surging, _ = one.update(0.2, 2.4)
     assert (surging.purpose, surging.setpoint) == (Purpose.BRAKE, GuidedVelocity(0.0, 0.0))
     assert one.update(0.3, 2.2)[0].purpose is Purpose.DRIVE
-
-
-def test_where_things_move_the_rover_is_slow_until_it_is_known_whether_a_new_thing_does() -> None:
-    """And for a minute after the last of them was seen; elsewhere new things are nothing special."""
-    drive = Drive(InlineRunner())
-    drive.head_for(target(30.5, 20.5))
-    drive.update(0.0)
-    far = Moving("m", 0.0, NedPoint(0.0, 0.0), 0.0, -1.0, 0.5)
-
-    def told_m_s(time_s: float, *, moves: bool, doubtful: bool) -> float:
-        view = drive.at(time_s, 1.0)
-        drive.driver.pause()  # it does not move here
-        drive.driver.decide(view)
-        return drive.driver.guide(view, (far,) if moves else (), doubtful=doubtful).speed_m_s
-
-    wary_m_s = SETTINGS.traffic.wary_m_s
-    assert told_m_s(0.1, moves=False, doubtful=True) > wary_m_s
-    assert told_m_s(0.2, moves=True, doubtful=True) == wary_m_s
-    assert told_m_s(0.3, moves=True, doubtful=False) > wary_m_s
-    assert told_m_s(60.0, moves=False, doubtful=True) == wary_m_s
-    assert told_m_s(61.0, moves=False, doubtful=True) > wary_m_s
