@@ -40,8 +40,7 @@ LEAST_S, LEAST_SIGHTINGS = 0.28, 4
 """Four scans at 10 Hz, which do not come exactly 0.1 s apart."""
 CUT_SIGHTINGS = 5
 """Of what the edge of the view cuts off, where the ground was never seen free: a trunk, seen by a rover that turns."""
-LOST_S, HIDDEN_S = 1.0, 3.0
-"""A thing that is not found again is given up after so long: where it should be in view, and where it is not."""
+LOST_S = 1.0
 LEAST_RADIUS_M = 0.4
 STRAY_M = 0.15
 """Sightings of a thing that moves evenly lie this near to a line, on average, and half a beam's width more."""
@@ -160,7 +159,7 @@ class ObjectTracker:
         if free.any() or scan.beam_width_rad <= FINE_RAD:  # without either nothing of it may move
             things = _seen_things(ends, free, _alone(scan), pose, scan.beam_width_rad)
         if things or self._tracks:
-            self._follow(pose, scan, things)
+            self._follow(pose.time_s, things)
 
     def remember(self, pose: Pose, reach_m: float) -> None:
         """Note what a scan just added to the map has shown to be free."""
@@ -172,7 +171,7 @@ class ObjectTracker:
         found = []
         for track in self._tracks:
             estimate = track.estimate
-            if estimate is not None and now_s - estimate[0].time_s <= HIDDEN_S:
+            if estimate is not None and now_s - estimate[0].time_s <= LOST_S:
                 moving, believed = estimate
                 if believed and moving.speed_m_s >= settings.moving_m_s:
                     found.append(moving)
@@ -189,15 +188,14 @@ class ObjectTracker:
         frame = self._evidence.frame
         return free_all_round(self._free, frame.xys(points), round_m * frame.cells(1.0))
 
-    def _follow(self, pose: Pose, scan: RangeScan, things: list[Sighting]) -> None:
+    def _follow(self, time_s: float, things: list[Sighting]) -> None:
         """Give each thing to the track that expects it nearest; a thing that no track expects begins a new one."""
-        tracks, time_s = [], pose.time_s
+        tracks = []
         for track in self._tracks:
             expected = _expected(track, time_s)
             nearest = min(things, key=lambda one: math.dist((one.north_m, one.east_m), expected), default=None)
             if nearest is None or math.dist((nearest.north_m, nearest.east_m), expected) > nearest.found_again_m:
-                kept_s = LOST_S if _is_in_view(expected, pose, scan) else HIDDEN_S
-                if time_s - track.sightings[-1].time_s <= kept_s:
+                if time_s - track.sightings[-1].time_s <= LOST_S:
                     tracks.append(track)
                 continue
             things.remove(nearest)
@@ -217,16 +215,6 @@ def _expected(track: Track, time_s: float) -> tuple[float, float]:
         return last.north_m, last.east_m
     there = estimate[0].at(time_s)
     return there.north_m, there.east_m
-
-
-def _is_in_view(place: tuple[float, float], pose: Pose, scan: RangeScan) -> bool:
-    """Whether a scan would show what stands at a place (north, east): a beam looks there, and ends no earlier."""
-    to_n, to_e = place[0] - pose.north_m, place[1] - pose.east_m
-    away_m, bearing_rad = math.hypot(to_n, to_e), math.atan2(to_e, to_n) - pose.heading_rad
-    beside_rad = np.abs(np.mod(scan.bearing_rad - bearing_rad + math.pi, 2.0 * math.pi) - math.pi)
-    beam = int(beside_rad.argmin())
-    reaches_m = min(scan.range_m[beam] + TOGETHER_M, scan.max_range_m)
-    return bool(beside_rad[beam] <= scan.beam_width_rad and away_m <= reaches_m)
 
 
 def _ends(pose: Pose, scan: RangeScan) -> tuple[Points, Points]:

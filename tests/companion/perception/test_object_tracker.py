@@ -182,26 +182,6 @@ def test_four_scans_are_enough_also_where_they_do_not_come_exactly_in_time() -> 
     assert estimate is not None and estimate[1] and estimate[0].north_m_s == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("turned_rad", "kept_s"), [(0.0, 1.0), (1.5, 3.0)])
-def test_what_is_out_of_sight_is_not_gone(turned_rad: float, kept_s: float) -> None:
-    """A thing that is not where it should be is given up soon; one at which no beam looks any more is not."""
-    evidence = new_map(empty_grid(40, 40), 0.35, SETTINGS.mapping)
-    evidence.log_odds.fill(-1.0)
-    tracker, bearings = ObjectTracker(evidence), np.radians(np.arange(-45.0, 45.0, 1.25))
-    here = Pose(10.0, 20.0, 0.0, 0.0)
-    tracker.remember(here, 8.0)
-
-    def look(time_s: float, heading_rad: float, away_m: float) -> bool:
-        range_m = np.where(np.abs(bearings) < 0.12, away_m, np.inf)
-        scan = RangeScan(time_s, bearings, range_m, 0.1, 4.5, np.radians(1.25), "test")
-        tracker.take(replace(here, heading_rad=heading_rad, time_s=time_s), 0.0, scan)
-        return bool(tracker.moving(time_s, SETTINGS.traffic))
-
-    assert [look(0.1 * i, 0.0, 4.0 - 0.05 * i) for i in range(6)][-1]
-    empty = [0.6 + 0.1 * i for i in range(40) if look(0.6 + 0.1 * i, turned_rad, np.inf)]
-    assert empty[-1] - 0.5 == pytest.approx(kept_s, abs=0.15)
-
-
 def test_the_trail_of_something_that_moves_is_soon_free_again() -> None:
     track = timed_track([(13.0, 12.0), (13.0, 40.0)], 1.0, 1.0, repeats=False)
     watcher = Watcher(World(np.zeros((40, 40), np.bool_), movers=(Mover("m", 0.5, track),)), "lidar-360", 3)
