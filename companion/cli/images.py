@@ -39,8 +39,8 @@ def save_plan(
     """Write an image of a path from one end to the other; the suffix decides the format. Raises OutputError.
 
     The map in greys (darker is costlier), framed on the path. ``tight``: places in fields, shape (n, 2), where the
-    rover could not follow it. ``heading``: of the rover at the start, in radians from east to
-    north, and what to say of it.
+    rover could not follow it. ``heading``: of the rover at the start, in radians from east to north, and what to say of
+    it.
     """
     start, target = (np.array([(end.x, end.y)], np.float64) for end in ends)
     cells = np.empty((0, 2)) if path is None else path.cell_array.astype(np.float64)

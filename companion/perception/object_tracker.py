@@ -2,9 +2,9 @@
 
 Ground on which something stands was never seen free. So readings count that end on ground that had been seen free all
 round. So do those of a narrow thing that stands alone, with nothing near on either side; but what stands seems to move,
-too, when it is seen from another side, so such a thing must be faster. Readings that lie together are one thing, and a
-thing whose place changes evenly from scan to scan moves. The map does not use this: there a moving thing is evidence
-like any other, and is freed behind it.
+too, when it is seen from another side, so such a thing must be faster. Where the edge of the view cuts one off, its
+other side is followed. Readings that lie together are one thing, and a thing whose place changes evenly from scan to
+scan moves. The map does not use this: there a moving thing is evidence like any other, and is freed behind it.
 
 Nouns: object tracker.
 """

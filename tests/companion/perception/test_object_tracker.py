@@ -134,7 +134,7 @@ def test_a_walker_on_ground_that_was_never_seen_is_noticed_in_time(suite: str, l
 def test_a_walker_at_the_edge_of_the_view_is_noticed_in_time_and_goes_where_it_goes() -> None:
     """It would pass close behind: the edge of the view cuts it off from the first, at 4 m."""
     sees_s, there_m = 3.0, 10.0 + 2.0 * 3.0 + 3.55
-    track = timed_track([(there_m, 22.8 + 0.9 * sees_s), (there_m, 10.0)], 0.9, 0.0, repeats=False)
+    track = timed_track([(there_m, 23.0 + 0.9 * sees_s), (there_m, 10.0)], 0.9, 0.0, repeats=False)
     for seed in range(6):
         watcher = Watcher(World(np.zeros((40, 40), np.bool_), movers=(Mover("m", 0.4, track),)), "lidar-90", seed, 2.0)
         found = [watcher.look() for _ in range(round(sees_s / PERIOD_S) + 8)][-1]
