@@ -240,11 +240,13 @@ class MotionController:
         return self._braking(view, worst)
 
     def _braking(self, view: LocalView, worst: Problems) -> ToldVelocity:
-        """The way to brake that keeps most room, straight on where there is enough."""
+        """The way to brake that keeps most room; straight on where there is enough, or where dragged and in doubt."""
         now_s, fastest_rad_s = self._time_s, worst[0].model.turn_fastest_rad_s
         spares_m = _braking_spares_m(BRAKE_TURNS * fastest_rad_s, view, worst)
         doubtful = (BRAKE_TURNS != 0.0) & (spares_m < STRAIGHTER_M)
-        best = float(BRAKE_TURNS[np.argmax(np.minimum(spares_m, ENOUGH_M) - STRAIGHTER_M * doubtful)])
+        # How fast it shoots ahead where ground ends that drags it is a guess, and so is where it turns meanwhile.
+        worse_m = STRAIGHTER_M if view.dragged_m_s == 0.0 else math.inf
+        best = float(BRAKE_TURNS[np.argmax(np.minimum(spares_m, ENOUGH_M) - np.where(doubtful, worse_m, 0.0))])
         rolls = abs(worst[0].start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
 

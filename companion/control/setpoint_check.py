@@ -124,13 +124,27 @@ def inside_borders(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault
     """The straight way to a guided position, and the way on which a guided velocity ends, cross no border."""
     if len(bounds) == 0:
         return None
+    name = ""
     if isinstance(setpoint, GuidedPosition):
         name = bounds.fault((view.pose.point, setpoint.point))
     elif isinstance(setpoint, GuidedVelocity) and setpoint.forward_m_s != 0.0:
-        name = next((name for way in _ways(setpoint, view) if (name := bounds.fault(way))), "")
-    else:
-        return None
+        name = _crossed(setpoint, view, bounds)
+    elif isinstance(setpoint, GuidedVelocity) and _stops_and_turns(setpoint, view):
+        name = _crossed(setpoint, view, bounds)
+        if name and _crossed(GuidedVelocity(0.0, 0.0), view, bounds):
+            name = ""  # a plain stop in its place would cross one, too
     return Reason(SetpointFault.OVER_BORDER, (name,)) if name else None
+
+
+def _stops_and_turns(velocity: GuidedVelocity, view: LocalView) -> bool:
+    """Whether a rover whose motions are planned turns while it comes to a stop."""
+    planned = view.settings.guidance.controller != "points"
+    return planned and velocity.yaw_rate_rad_s != 0.0 and view.speed_m_s > STANDS_M_S
+
+
+def _crossed(velocity: GuidedVelocity, view: LocalView, bounds: Bounds) -> str:
+    """The first border on any of the ways on which it may end; empty for none."""
+    return next((name for way in _ways(velocity, view) if (name := bounds.fault(way))), "")
 
 
 def _ways(velocity: GuidedVelocity, view: LocalView) -> list[list[NedPoint]]:

@@ -462,6 +462,25 @@ def test_close_before_a_border_only_standing_still_is_left(forward_m_s: float, r
     assert bool(inside_borders(GuidedVelocity(forward_m_s, 0.0), at, Bounds((inner(1.0),)))) is refused
 
 
+@pytest.mark.parametrize(
+    ("east_m", "heading_rad", "yaw_rate_rad_s", "refused"),
+    [
+        (0.1, 0.0, 1.0, True),
+        (0.1, 0.0, -1.0, False),
+        (3.0, 0.0, 1.0, False),
+        (0.5, 0.5 * math.pi, 0.5, False),
+    ],
+)
+def test_a_stop_may_turn_over_a_border_only_where_a_plain_one_crosses_it_too(
+    east_m: float, heading_rad: float, yaw_rate_rad_s: float, refused: bool
+) -> None:
+    """At 2 m/s, along a border so far to the right, and straight towards one."""
+    yard_shape = shapely.box(-9.0, -9.0, MIDDLE + RADIUS_M + east_m, 99.0)
+    bounds = Bounds((Bound("the yard", yard_shape, True, RADIUS_M, RADIUS_M),))
+    at = replace(view(open_ground(), Pose(MIDDLE, MIDDLE, heading_rad, 0.0), 2.0), settings=PLANNED)
+    assert bool(inside_borders(GuidedVelocity(0.0, yaw_rate_rad_s), at, bounds)) is refused
+
+
 def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path) -> None:
     """Without the map and its rules the shapes alone keep the rover inside the autopilot's fence, and it is said."""
     rig = Rig(yard(tmp_path), prepare=stored(box(KEEP_IN, -6.0, -2.4, 6.5, 20.0), **POLYGONS, FENCE_MARGIN=0.0))
