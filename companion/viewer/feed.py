@@ -24,8 +24,11 @@ from companion.viewer.map_tiles import TileWatch
 from companion.viewer.retelling import Receiver, Retelling, run_id
 from companion.viewer.steady_frame import SteadyFrame
 
-FRAME_S, TILES_S, SCENE_S = 0.19, 0.5, 2.0
+FRAME_S, TILES_S, SCENE_S = 0.19, 0.24, 2.0
 """So often each is told, in real time."""
+BEHIND_S, LATE_S = 0.04, 0.5
+"""So often tiles are told while there are some that nobody has looked at yet; after so long a frame does not keep them
+from being told."""
 NEWS_KEPT, TOUCHED_KEPT = 200, 50
 
 Json = dict[str, Any]
@@ -66,13 +69,16 @@ class ViewerFeed:
                 self._watch.tell_again()
         knows_all, now_s = self._retelling.tell(), stopwatch_s()
         if now_s - self._frame_s < FRAME_S and not self._companion.done:
+            if knows_all and not self._receiver.is_full:
+                self._tell_tiles(status, now_s)
             return
         self._frame_s, frame = now_s, self._frame(status)
         self._retelling.past.take(frame)
         if self._receiver.is_full or not (knows_all or self._companion.done):
             return
         self._tell_scene(now_s)
-        self._tell_tiles(status, now_s)
+        if self._companion.done or now_s - self._tiles_s >= LATE_S:
+            self._tell_tiles(status, now_s)  # else in a tick of its own: the next one may be due soon
         if self._put({**frame, "news": self._news}):
             self._news = []
 
@@ -115,7 +121,10 @@ class ViewerFeed:
         executor, pose = self._companion.executor, status.pose
         if executor is None or pose is None or self._watch is None or self._scene.get("map_epoch") != self._epoch:
             return
-        if now_s - self._tiles_s < TILES_S and not self._watch.is_behind:
+        if executor.evidence is not self._evidence:
+            return  # another map, of which the scene says nothing yet
+        due_s = self._tiles_s + (BEHIND_S if self._watch.is_behind else TILES_S)
+        if now_s < due_s and not self._companion.done:
             return
         self._tiles_s = now_s
         seen = self._companion.vehicle.scan

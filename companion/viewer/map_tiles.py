@@ -21,11 +21,11 @@ from companion.viewer.wire import Place
 
 TILE = 64
 """Cells along a side."""
-MOST_NEAR = 24
+MOST_NEAR = 12
 """Tiles within the sensors' reach that are looked at each time."""
-GLANCES, AT_ONCE = 100, 32
+GLANCES, AT_ONCE = 40, 12
 """Tiles that are looked at for the first time each time, until so many of them hold something."""
-IN_TURN = 8
+IN_TURN = 4
 """Tiles that the map may have forgotten meanwhile, looked at each time."""
 NOT_TOLD = b""
 """Stands for a tile that could not be told: whoever looks may hold an older one."""
@@ -63,7 +63,7 @@ class TileWatch:
     """Knows the tiles of one map as they were last told. A tile that never held anything is not told.
 
     Each look takes those round the rover, some of those that nobody has looked at yet, the nearest first, and a few
-    others in turn: so it takes about a millisecond, however large the map is and however far the sensor sees.
+    others in turn: so it takes less than a millisecond, however large the map is and however far the sensor sees.
     """
 
     def __init__(self, evidence: EvidenceMap) -> None:
@@ -73,15 +73,15 @@ class TileWatch:
         """The cells of each."""
         self._waiting: list[Place] = []
         """Those that nobody has looked at yet, the next one last."""
-        self._is_ordered = False
+        self._all_wait = True
+        """None has been looked at yet, and ``_waiting`` is still to be made."""
         self._in_turn: deque[Place] = deque()
         self._far_at = 0
-        self.tell_again()
 
     @property
     def is_behind(self) -> bool:
         """Whether there are tiles that nobody has looked at yet."""
-        return bool(self._waiting)
+        return self._all_wait or bool(self._waiting)
 
     def tell_again(self, places: Iterable[Place] | None = None) -> None:
         """These were not told after all; None: whoever was told anything has forgotten it."""
@@ -90,19 +90,16 @@ class TileWatch:
             self._told.update((place, NOT_TOLD) for place in again)
             self._waiting.extend(again)
             return
-        columns, rows = self._size
         self._told.clear()
         self._in_turn.clear()
-        self._waiting = [(column, row) for row in range(rows) for column in range(columns)]
-        self._is_ordered = False
+        self._all_wait = True
 
     def changed(self, evidence: EvidenceMap, around: NedPoint, reach_m: float) -> list[tuple[Place, bytes]]:
         """The tiles that differ from what was told, with their cells in runs."""
         x, y = evidence.frame.xy(around)
         middle = x / TILE - 0.5, y / TILE - 0.5
-        if not self._is_ordered:
-            self._waiting.sort(key=lambda place: (math.dist(place, middle), place), reverse=True)
-            self._is_ordered = True
+        if self._all_wait:
+            self._waiting, self._all_wait = self._farthest_first(middle), False
         places = self._nearest(self._places_around(evidence, around, reach_m), middle)
         for _ in range(min(IN_TURN, len(self._in_turn))):
             places.add(self._in_turn[0])
@@ -126,6 +123,12 @@ class TileWatch:
             self._in_turn.append(place)
         self._told[place] = cells
         return place, run_lengths(tile)
+
+    def _farthest_first(self, middle: tuple[float, float]) -> list[Place]:
+        """All tiles. ``middle``: where the rover is, in tiles."""
+        columns, rows = (axis.ravel() for axis in np.meshgrid(*map(np.arange, self._size)))
+        order = np.argsort(np.hypot(columns - middle[0], rows - middle[1]), kind="stable")[::-1]
+        return list(zip(columns[order].tolist(), rows[order].tolist(), strict=True))
 
     def _nearest(self, near: set[Place], middle: tuple[float, float]) -> set[Place]:
         """Of many the nearest, and some of the others in turn. ``middle``: where the rover is, in tiles."""

@@ -65,7 +65,7 @@ def new_drive(controller: str = "motion-ga") -> Drive:
 @pytest.fixture
 def every_tick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Real time is too slow for a test: at every look."""
-    for name in ("FRAME_S", "TILES_S", "SCENE_S"):
+    for name in ("FRAME_S", "TILES_S", "SCENE_S", "BEHIND_S", "LATE_S"):
         monkeypatch.setattr(feed, name, -1.0)
 
 
@@ -164,6 +164,31 @@ def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_
     again = Heard()
     ViewerFeed(run.companion, again, {}).show(run.take_status())
     assert again.scenes[0]["run"] != heard.scenes[0]["run"] and len({one["run"] for one in heard.scenes}) == 1
+
+
+def test_frames_and_tiles_are_told_in_ticks_of_their_own_and_tiles_in_any_if_they_are_late(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The next tick may be due soon."""
+    run, heard, now_s, told = new_drive("points"), Heard(), [0.0], []
+    watched = ViewerFeed(run.companion, heard, {})
+    monkeypatch.setattr(feed, "stopwatch_s", lambda: now_s[0])
+
+    def look(status, tick_s: float) -> str:
+        now_s[0] += tick_s
+        frames = len(heard.frames)
+        heard.tiles.clear()
+        watched.show(status)
+        return "frame" * (len(heard.frames) > frames) + "tiles" * bool(heard.tiles)
+
+    while run.simulator.driven_m < 3.0:
+        run.companion.tick()
+        told.append(look(run.take_status(), 0.05))
+    assert set(told[-20:]) == {"frame", "tiles", ""}
+    for _ in range(10):
+        run.companion.tick()
+        told.append(look(run.take_status(), 0.2))
+    assert set(told[-10:]) == {"frame", "frametiles"}
 
 
 def test_a_speed_that_nobody_has_told_is_none() -> None:
