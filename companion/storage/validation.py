@@ -17,6 +17,8 @@ WANTED = {
     "tuple_type": "a list in [brackets]",
 }
 """What pydantic calls by names of Python's types."""
+MOST_OTHERS = 3
+"""So many places are named beside the first fault."""
 NUMBER = r"[+-]?[\d_]+([.,]\d+)?"
 QUOTED = {"float_type": NUMBER, "int_type": r"[+-]?\d+", "bool_type": "true|false"}
 """What people put in quotes where it needs none."""
@@ -29,12 +31,34 @@ def first_fault(error: ValidationError) -> tuple[str, str]:
 
 
 def describe_first(error: ValidationError, model: type[BaseModel]) -> str:
-    """The first fault of a validation in one line: place and reason.
+    """The first fault of a validation in one line: place and reason, and the places of the next ones.
 
     For an unknown key, also the nearest known key, or all.
     """
+    others = _other_places(error, model)
+    more = f", and {len(others) - MOST_OTHERS} more" if len(others) > MOST_OTHERS else ""
+    also = f" (also wrong: {', '.join(others[:MOST_OTHERS])}{more})" if others else ""
     # Quoted keys may hold any character.
-    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in _described(error, model))
+    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in _described(error, model) + also)
+
+
+def _other_places(error: ValidationError, model: type[BaseModel]) -> list[str]:
+    """Where else something is wrong, tables counted from 1. What pydantic tried in turn for one value is one place."""
+    places = [_place(fault["loc"], model) for fault in error.errors(include_url=False)]
+    return [place for place in dict.fromkeys(places) if place and place != places[0]]
+
+
+def _place(keys: tuple[int | str, ...], model: type[BaseModel]) -> str:
+    """The keys as far as they are those of the file: behind them may stand kinds of values."""
+    text = ""
+    for at, key in enumerate(keys):
+        if isinstance(key, int):
+            text += f" {key + 1}"
+            continue
+        text += f".{key}" if text else key
+        if key not in _known_keys(model, keys[:at]) or not _has_tables(model, keys[: at + 1]):
+            break
+    return text
 
 
 def alike(name: str, known: Iterable[str]) -> str:
@@ -95,9 +119,18 @@ def _sections_with(model: type[BaseModel], key: str) -> list[str]:
 
 def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
     """The keys of the model at a place; looks through lists and optional values."""
+    return list(_model_at(model, place).model_fields)
+
+
+def _has_tables(model: type[BaseModel], place: tuple[int | str, ...]) -> bool:
+    """Whether tables stand at a place, which is no kind of value but one more table or more."""
+    return _model_at(model, place) is not _model_at(model, place[:-1])
+
+
+def _model_at(model: type[BaseModel], place: tuple[int | str, ...]) -> type[BaseModel]:
     for key in place:
         field = model.model_fields.get(str(key))
         if field is not None:
             inside = (field.annotation, *get_args(field.annotation))
             model = next((kind for kind in inside if isinstance(kind, type) and issubclass(kind, BaseModel)), model)
-    return list(model.model_fields)
+    return model

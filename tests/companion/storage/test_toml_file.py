@@ -22,6 +22,7 @@ class Cart(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     name: str = ""
+    load_kg: float | bool | None = None
     wheel: list[Wheel] = []
 
 
@@ -66,7 +67,7 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
         ("[wheel]\nradius_m = 1.0", "wheel: one table where several may stand; write [[wheel]] with double brackets"),
         ("\ufeffname = 1", "name: input should be a valid string"),
         ("nam = 'a'", "nam: unknown key, did you mean 'name'?; see the manual"),
-        ('"a\\nb" = 1', "a\\nb: unknown key; known here: name, wheel"),
+        ('"a\\nb" = 1', "a\\nb: unknown key; known here: name, load_kg, wheel"),
     ],
 )
 def test_a_wrong_table_is_told_with_its_place_counted_from_one(tmp_path: Path, content: str, reason: str) -> None:
@@ -83,3 +84,25 @@ def test_a_wrong_table_is_told_with_its_place_counted_from_one(tmp_path: Path, c
 )
 def test_only_names_with_nearly_the_same_spelling_are_offered(name: str, near: str) -> None:
     assert alike(name, ["hybrid", "theta-star", "astar", "prm", "dijkstra"]) == near
+
+
+@pytest.mark.parametrize(
+    ("content", "also"),
+    [
+        ("name = 1", ""),
+        ("load_kg = 'a'", ""),
+        ("name = 1\nload_kg = 'a'\nnmae = 1", " (also wrong: load_kg, nmae)"),
+        (
+            "name = 1\n" + "[[wheel]]\n" * 5,
+            " (also wrong: wheel 1.radius_m, wheel 2.radius_m, wheel 3.radius_m, and 2 more)",
+        ),
+        ("[[wheel]]\nradius_m = 1\n[[wheel]]\nradius_m = 'b'\nwidth_m = 1", " (also wrong: wheel 2.width_m)"),
+    ],
+)
+def test_what_else_is_wrong_is_named_by_its_place(tmp_path: Path, content: str, also: str) -> None:
+    file = tmp_path / "f.toml"
+    file.write_text(content)
+    with pytest.raises(KeyError) as caught:
+        read_table(file, Cart, KeyError)
+    (text,) = caught.value.args
+    assert text.endswith(also) if also else "also wrong" not in text
