@@ -66,6 +66,8 @@ ENOUGH_M = 0.1
 STRAIGHTER_M = 0.03
 """Nor where turning keeps less room than this and hardly more than braking straight on: no model of a rover is that
 exact."""
+DRAGGED_STRAIGHTER_M = 0.1
+"""The same on ground that drags it."""
 STANDS_M_S = 0.05
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
 """Turn rates for which the fastest speed is looked for that may be told, as shares of the fastest."""
@@ -245,7 +247,7 @@ class MotionController:
         spares_m = _braking_spares_m(BRAKE_TURNS * fastest_rad_s, view, worst)
         doubtful = (BRAKE_TURNS != 0.0) & (spares_m < STRAIGHTER_M)
         # How fast it shoots ahead where ground ends that drags it is a guess, and so is where it turns meanwhile.
-        worse_m = STRAIGHTER_M if view.dragged_m_s == 0.0 else math.inf
+        worse_m = STRAIGHTER_M if view.dragged_m_s == 0.0 else DRAGGED_STRAIGHTER_M
         best = float(BRAKE_TURNS[np.argmax(np.minimum(spares_m, ENOUGH_M) - np.where(doubtful, worse_m, 0.0))])
         rolls = abs(worst[0].start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)

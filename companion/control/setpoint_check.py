@@ -131,8 +131,8 @@ def inside_borders(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault
         name = _crossed(setpoint, view, bounds)
     elif isinstance(setpoint, GuidedVelocity) and _stops_and_turns(setpoint, view):
         name = _crossed(setpoint, view, bounds)
-        if name and _crossed(GuidedVelocity(0.0, 0.0), view, bounds):
-            name = ""  # a plain stop in its place would cross one, too
+        if name and not _may_just_stop(view, bounds):
+            name = ""
     return Reason(SetpointFault.OVER_BORDER, (name,)) if name else None
 
 
@@ -140,6 +140,12 @@ def _stops_and_turns(velocity: GuidedVelocity, view: LocalView) -> bool:
     """Whether a rover whose motions are planned turns while it comes to a stop."""
     planned = view.settings.guidance.controller != "points"
     return planned and velocity.yaw_rate_rad_s != 0.0 and view.speed_m_s > STANDS_M_S
+
+
+def _may_just_stop(view: LocalView, bounds: Bounds) -> bool:
+    """Whether a plain stop would cross no border and meet nothing: else it is no better than what it replaces."""
+    stops = GuidedVelocity(0.0, 0.0)
+    return not _crossed(stops, view, bounds) and _fault_on(ways_left_alone(stops, view), view) is None
 
 
 def _crossed(velocity: GuidedVelocity, view: LocalView, bounds: Bounds) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
+from companion.mapping.evidence_map import EvidenceMap
 from companion.safety.reasons import EndReason, Reason
 from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
@@ -24,11 +25,10 @@ from companion.viewer.map_tiles import TileWatch
 from companion.viewer.retelling import Receiver, Retelling, run_id
 from companion.viewer.steady_frame import SteadyFrame
 
-FRAME_S, TILES_S, SCENE_S = 0.19, 0.24, 2.0
+FRAME_S, TILES_S, SCENE_S = 0.19, 0.04, 2.0
 """So often each is told, in real time."""
-BEHIND_S, LATE_S = 0.04, 0.5
-"""So often tiles are told while there are some that nobody has looked at yet; after so long a frame does not keep them
-from being told."""
+LATE_S, MOST_S = 0.19, 0.25
+"""After so long a frame does not keep tiles from being told; a look makes up for no more than so long."""
 NEWS_KEPT, TOUCHED_KEPT = 200, 50
 
 Json = dict[str, Any]
@@ -68,18 +68,32 @@ class ViewerFeed:
             if self._watch is not None:
                 self._watch.tell_again()
         knows_all, now_s = self._retelling.tell(), stopwatch_s()
-        if now_s - self._frame_s < FRAME_S and not self._companion.done:
-            if knows_all and not self._receiver.is_full:
+        self._note_reach(status)
+        if self._companion.done:
+            self._tell_last(status, now_s)
+            return
+        tells = knows_all and not self._receiver.is_full
+        if now_s - self._frame_s < FRAME_S:
+            if tells:
                 self._tell_tiles(status, now_s)
             return
         self._frame_s, frame = now_s, self._frame(status)
         self._retelling.past.take(frame)
-        if self._receiver.is_full or not (knows_all or self._companion.done):
+        if not tells:
             return
         self._tell_scene(now_s)
-        if self._companion.done or now_s - self._tiles_s >= LATE_S:
+        if now_s - self._tiles_s >= LATE_S:
             self._tell_tiles(status, now_s)  # else in a tick of its own: the next one may be due soon
         if self._put({**frame, "news": self._news}):
+            self._news = []
+
+    def _tell_last(self, status: Status, now_s: float) -> None:
+        """The last moment, with the map as it is; also where nothing more is taken now, as it will be closed then."""
+        frame = self._frame(status)
+        self._retelling.past.take(frame)
+        self._tell_scene(now_s)
+        self._tell_tiles(status, now_s, seconds=math.inf)
+        if self._put({**frame, "news": self._news}, last=True):
             self._news = []
 
     def _note(self, news: list[Json]) -> None:
@@ -92,7 +106,8 @@ class ViewerFeed:
         frame = self._frame(self._companion.status())
         if frame["state"] != "ended":
             frame.update(**end_of(self._companion, Reason(reason)), **wire.NOBODY_DRIVES)
-        if self._put({**frame, "news": self._news}):
+        self._tell_tiles(self._companion.status(), stopwatch_s(), seconds=math.inf)
+        if self._put({**frame, "news": self._news}, last=True):
             self._news = []
 
     def _tell_scene(self, now_s: float) -> None:
@@ -101,11 +116,10 @@ class ViewerFeed:
         another = self._notice_map()
         if now_s - self._scene_s < SCENE_S and not another:
             return
-        self._scene_s = now_s
         scene = scene_of(companion.mission_run.mission, companion.mission_run, self._epoch)
         scene = {**self.steady.scene(scene), **self._always}
-        if scene != self._scene and self._put(scene):
-            self._scene = scene
+        if scene == self._scene or self._put(scene, last=self._companion.done):
+            self._scene, self._scene_s = scene, now_s
 
     def _notice_map(self) -> bool:
         """Whether it is another map than before."""
@@ -117,20 +131,34 @@ class ViewerFeed:
         self._watch = None if evidence is None else TileWatch(evidence)
         return True
 
-    def _tell_tiles(self, status: Status, now_s: float) -> None:
-        executor, pose = self._companion.executor, status.pose
-        if executor is None or pose is None or self._watch is None or self._scene.get("map_epoch") != self._epoch:
-            return
-        if executor.evidence is not self._evidence:
-            return  # another map, of which the scene says nothing yet
-        due_s = self._tiles_s + (BEHIND_S if self._watch.is_behind else TILES_S)
-        if now_s < due_s and not self._companion.done:
-            return
-        self._tiles_s = now_s
+    def _shown_map(self) -> EvidenceMap | None:
+        """The map that the page shows; None if it shows none, or another one than the companion has now."""
+        executor = self._companion.executor
+        if executor is None or executor.evidence is not self._evidence:
+            return None
+        return executor.evidence
+
+    def _reach_m(self) -> float:
         seen = self._companion.vehicle.scan
-        reach_m = 0.0 if seen is None else seen.scan.max_range_m
-        news = self._watch.changed(executor.evidence, pose.point, reach_m)
-        if news and not self._receiver.put(wire.TILES, wire.tile_message(news)):
+        return 0.0 if seen is None else seen.scan.max_range_m
+
+    def _note_reach(self, status: Status) -> None:
+        """What may change now must be looked at some time."""
+        evidence = self._shown_map()
+        if evidence is not None and self._watch is not None and status.pose is not None:
+            self._watch.note(evidence, status.pose.point, self._reach_m())
+
+    def _tell_tiles(self, status: Status, now_s: float, seconds: float | None = None) -> None:
+        """What has changed. ``seconds``: how long no tiles were told; None: as it is, at most ``MOST_S``."""
+        evidence, pose = self._shown_map(), status.pose
+        if evidence is None or pose is None or self._watch is None or self._scene.get("map_epoch") != self._epoch:
+            return
+        if seconds is None and now_s - self._tiles_s < TILES_S:
+            return
+        due_s = min(now_s - self._tiles_s, MOST_S) if seconds is None else seconds
+        self._tiles_s = now_s
+        news = self._watch.changed(evidence, pose.point, self._reach_m(), due_s)
+        if news and not self._receiver.put(wire.TILES, wire.tile_message(news), last=seconds is not None):
             self._watch.tell_again(place for place, _ in news)
 
     def _frame(self, status: Status) -> Json:
@@ -142,5 +170,5 @@ class ViewerFeed:
         frame["touched"] = list((self.touched or ())[-TOUCHED_KEPT:])
         return self._last_place.told(frame, self._companion.vehicle, status.time_s)
 
-    def _put(self, message: Json) -> bool:
-        return self._receiver.put(wire.JSON, json.dumps(message, allow_nan=False).encode())
+    def _put(self, message: Json, *, last: bool = False) -> bool:
+        return self._receiver.put(wire.JSON, json.dumps(message, allow_nan=False).encode(), last=last)

@@ -37,6 +37,8 @@ from companion.viewer.wire import tile_message
 
 FRAME_S, PATH_S, TILES_S = 0.4, 1.2, 1.0
 """So often each is kept."""
+LOOK_S = 2.5
+"""Each look at the map is as long as one after so many seconds would be beside a drive: nobody waits here."""
 GOES_ON = (DecisionReason.FOLLOWING, DecisionReason.NO_BETTER_PATH)
 """Decisions with which the rover goes on as before, like going back for the second time in a row."""
 MOST_PLACES = 120
@@ -162,7 +164,7 @@ class ReportWatch(ReplayObserver):
         if time_s - self._frame_s >= FRAME_S - 1e-6 or companion.done:
             self._frame_s = time_s
             self._keep(companion, status, time_s)
-            self._take_map(companion, time_s)
+            self._take_map(companion, time_s, whole=companion.done)
         elif self._headway.begins or doing_of(companion, status, self._headway)["state"] != self._before["state"]:
             self._keep(companion, status, time_s)  # however short it is, what the tables count is to be seen
 
@@ -170,7 +172,7 @@ class ReportWatch(ReplayObserver):
         """The record ends here, perhaps between two frames, and perhaps in the middle of the drive."""
         if not self.frames or round(time_s, 2) > self.frames[-1]["t"]:
             self._keep(companion, companion.status(), time_s)
-            self._take_map(companion, time_s)
+        self._take_map(companion, time_s, whole=True)
         if reason is not None and self._before["state"] != "ended":
             self.frames[-1].update(end_of(companion, Reason(reason)))
 
@@ -194,24 +196,26 @@ class ReportWatch(ReplayObserver):
         self.frames[-1]["t"] = frame["t"]
         self._before = frame
 
-    def _take_map(self, companion: Companion, time_s: float) -> None:
+    def _take_map(self, companion: Companion, time_s: float, *, whole: bool) -> None:
+        """What has changed on it. ``whole``: all of that."""
         executor, pose = companion.executor, companion.status().pose
         if executor is None or pose is None:
             return
-        whole = companion.done
         if self._evidence is None and not executor.evidence.log_odds.any():
             return  # the first picture of the map is whole: not before there is something on it
         if executor.evidence is not self._evidence:
             self._evidence, self._watch, whole = executor.evidence, TileWatch(executor.evidence), True
             self.scene = self._steady.scene(scene_of(self._mission, companion.mission_run, 1))
             self.maps.append((round(time_s, 2), self.scene["map"]))
-        if self._watch is None or (time_s - self._tiles_s < TILES_S - 1e-6 and not whole):
+        if self._watch is None:
             return
-        self._tiles_s, seen = time_s, companion.vehicle.scan
+        seen = companion.vehicle.scan
         reach_m = 0.0 if seen is None else seen.scan.max_range_m
-        news = self._watch.changed(executor.evidence, pose.point, reach_m)
-        while whole and self._watch.is_behind:  # nobody waits for a report's ticks
-            news += self._watch.changed(executor.evidence, pose.point, 0.0)
+        if time_s - self._tiles_s < TILES_S - 1e-6 and not whole:
+            self._watch.note(executor.evidence, pose.point, reach_m)
+            return
+        self._tiles_s = time_s
+        news = self._watch.changed(executor.evidence, pose.point, reach_m, math.inf if whole else LOOK_S)
         if news:
             self.tiles.append((round(time_s, 2), base64.b64encode(tile_message(news)).decode()))
 

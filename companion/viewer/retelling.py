@@ -36,8 +36,8 @@ class Receiver(Protocol):
         """Whether nothing more can be taken now."""
         ...
 
-    def put(self, kind: bytes, payload: bytes) -> bool:
-        """One more message; False if it was not taken."""
+    def put(self, kind: bytes, payload: bytes, *, last: bool = False) -> bool:
+        """One more message; False if it was not taken. ``last``: one of the last ones, for which room is kept."""
         ...
 
 

@@ -30,7 +30,8 @@ from companion.core.clock import stopwatch_s
 from companion.storage.files import OsDisk, read_at_most, replace_file
 from companion.viewer import wire
 
-QUEUE = 20
+QUEUE, QUEUE_LAST = 20, 8
+"""So many messages wait; more of them at the end."""
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.5, 10.0
 """Before a web process that has ended is started again."""
 HANGS_S = 10.0
@@ -144,7 +145,7 @@ class WebProcess:
         self.started = 0
         self._socket = _listening(place)
         self.place = WebPlace(place.host, self._socket.getsockname()[1], place.token)
-        self._queue: queue.Queue[tuple[bytes, bytes] | None] = queue.Queue(QUEUE)
+        self._queue: queue.Queue[tuple[bytes, bytes] | None] = queue.Queue(QUEUE + QUEUE_LAST)
         self._asked: deque[Json] = deque(maxlen=MOST_ACTIONS)
         self._takes_actions = takes_actions
         self._closing = threading.Event()
@@ -160,11 +161,13 @@ class WebProcess:
 
     @property
     def is_full(self) -> bool:
-        """Whether nothing more can be taken now."""
-        return self._queue.full()
+        """Whether nothing more can be taken now, but for the last ones."""
+        return self._queue.qsize() >= QUEUE
 
-    def put(self, kind: bytes, payload: bytes) -> bool:
-        """One more message; False, at once, if the process does not keep up."""
+    def put(self, kind: bytes, payload: bytes, *, last: bool = False) -> bool:
+        """One more message; False, at once, if the process does not keep up. ``last``: see ``Receiver``."""
+        if self.is_full and not last:
+            return False
         try:
             self._queue.put_nowait((kind, payload))
         except queue.Full:

@@ -26,7 +26,7 @@ from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
 from companion.replay.replay import Observers, replay
 from companion.safety.reasons import EndReason
-from companion.viewer import frame, map_tiles, report_data, report_mcap
+from companion.viewer import frame, report_data, report_mcap
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
 from companion.viewer.frame import doing_of
 from companion.viewer.headway import Headway
@@ -281,8 +281,7 @@ def test_a_map_that_is_larger_than_a_look_is_whole_in_the_first_moment_and_in_th
         return told[0], {place: cells for message in told for place, cells in message.items()}
 
     first, last = tiles()
-    monkeypatch.setattr(map_tiles, "AT_ONCE", 1)
-    monkeypatch.setattr(map_tiles, "MOST_NEAR", 2)
+    monkeypatch.setattr(report_data, "LOOK_S", 0.01)
     assert tiles() == (first, last) and len(last) >= len(first) > 3
 
 

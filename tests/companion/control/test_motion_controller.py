@@ -341,6 +341,8 @@ def test_it_knows_ways_to_stop_that_turn_off_where_the_ground_allows_them() -> N
         (-0.143, -0.127, 0.0, False),
         (-0.143, -0.1, 0.0, True),
         (-0.143, -0.1, 1.5, False),
+        (-0.143, -0.02, 1.5, True),
+        (-1.0, 0.02, 1.5, True),
         (0.01, 0.025, 0.0, False),
         (0.02, 0.045, 0.0, True),
         (0.02, 0.045, 1.5, True),

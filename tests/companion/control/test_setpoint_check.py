@@ -479,6 +479,22 @@ def test_a_stop_may_turn_over_a_border_only_where_a_plain_one_crosses_it_too(
     bounds = Bounds((Bound("the yard", yard_shape, True, RADIUS_M, RADIUS_M),))
     at = replace(view(open_ground(), Pose(MIDDLE, MIDDLE, heading_rad, 0.0), 2.0), settings=PLANNED)
     assert bool(inside_borders(GuidedVelocity(0.0, yaw_rate_rad_s), at, bounds)) is refused
+    assert inside_borders(GuidedVelocity(0.0, yaw_rate_rad_s), replace(at, speed_m_s=0.0), bounds) is None
+    assert inside_borders(GuidedVelocity(0.0, yaw_rate_rad_s), replace(at, settings=SETTINGS), bounds) is None
+
+
+@pytest.mark.parametrize("walled", [True, False])
+def test_a_stop_may_turn_over_a_border_where_a_plain_one_ends_in_an_obstacle(walled: bool) -> None:
+    """A wall 1 m ahead of a rover at 2 m/s, and a border beside it."""
+    evidence = open_ground()
+    if walled:
+        north = int((MIDDLE + 1.0) / evidence.evidence_m)
+        evidence.log_odds[north : north + 4, :] = 3.0
+    bounds = Bounds(
+        (Bound("the yard", shapely.box(-9.0, -9.0, MIDDLE + RADIUS_M + 0.1, 99.0), True, RADIUS_M, RADIUS_M),)
+    )
+    at = replace(view(evidence, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 2.0), settings=PLANNED)
+    assert bool(inside_borders(GuidedVelocity(0.0, 1.0), at, bounds)) is not walled
 
 
 def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path) -> None:
