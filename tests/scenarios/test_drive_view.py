@@ -79,7 +79,7 @@ class Page:
         self.is_full = False
         self.told: list[dict[str, Any]] = []
 
-    def put(self, kind: bytes, payload: bytes) -> bool:
+    def put(self, kind: bytes, payload: bytes, *, last: bool = False) -> bool:
         self.told += [json.loads(payload)] if kind == JSON else []
         return True
 

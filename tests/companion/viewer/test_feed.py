@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-from copy import copy
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -209,8 +208,45 @@ def test_at_the_end_the_map_is_whole_and_the_end_is_told(
     assert_whole(heard, run)
 
 
-def test_another_map_is_not_told_as_the_one_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its tiles come after its scene."""
+def driven(watched: ViewerFeed, run: Drive, now_s: list[float]) -> None:
+    """Some metres, with a look at each tick."""
+    while run.simulator.driven_m < 3.0:
+        run.companion.tick()
+        now_s[0] += 0.05
+        watched.show(run.take_status())
+
+
+def test_what_was_lost_or_known_to_the_process_before_is_told_again_though_nothing_changes_any_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    run, heard, now_s = new_drive("points"), Heard(), [0.0]
+    monkeypatch.setattr(feed, "stopwatch_s", lambda: now_s[0])
+    watched = ViewerFeed(run.companion, heard, {})
+    heard.loses = 10**9
+    driven(watched, run, now_s)
+    assert not heard.tiles and heard.scenes
+
+    def stand() -> None:
+        for _ in range(200):
+            now_s[0] += 0.05
+            watched.show(run.companion.status())
+
+    heard.loses = 0
+    stand()
+    assert_whole(heard, run)
+    heard.tiles.clear()
+    heard.scenes.clear()
+    heard.frames.clear()
+    heard.begins_anew.set()
+    stand()
+    assert_whole(heard, run)
+    kinds = [frame["kind"] for frame in heard.frames]
+    assert heard.scenes and kinds[0] == "past" and "past" not in kinds[kinds.index("frame") :]
+
+
+@pytest.mark.parametrize("phase", range(4))
+def test_another_map_is_not_told_as_the_one_before(phase: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its tiles come after its scene, whether it is another one just before a frame or between two."""
     run, now_s, told = new_drive("points"), [0.0], []
     monkeypatch.setattr(feed, "stopwatch_s", lambda: now_s[0])
 
@@ -220,16 +256,17 @@ def test_another_map_is_not_told_as_the_one_before(monkeypatch: pytest.MonkeyPat
             return super().put(kind, payload, last=last)
 
     watched = ViewerFeed(run.companion, Ordered(), {})
-    while run.simulator.driven_m < 2.0:
-        run.companion.tick()
+    driven(watched, run, now_s)
+    for _ in range(phase):
         now_s[0] += 0.05
-        watched.show(run.take_status())
+        watched.show(run.companion.status())
     executor = run.companion.executor
     assert executor is not None and 2 not in told
-    other = copy(executor.evidence)
+    turned = np.where(executor.evidence.log_odds == 0.0, -1.0, 0.0).astype(np.float32)
+    other = replace(executor.evidence, log_odds=turned)
     monkeypatch.setattr(MissionExecutor, "evidence", property(lambda self: other))
     told.clear()
-    for _ in range(10):
+    for _ in range(20):
         now_s[0] += 0.05
         watched.show(run.companion.status())
     assert told.index(2) < told.index("tiles")

@@ -124,6 +124,24 @@ def test_a_companion_that_is_gone_without_a_word_is_told(web: WebProcess) -> Non
     assert last["state"] == "ended" and last["line"].startswith("ended, the companion's program is gone")
 
 
+def test_a_process_that_stood_still_until_the_end_is_told_the_end(web: WebProcess) -> None:
+    """The queue is full, and yet there is room for the last words."""
+    with looking(web) as client:
+        web.put(wire.JSON, json.dumps(frame(1.0)).encode())
+        assert newest(client, 1.0) == 1.0 and web.process_id is not None
+        os.kill(web.process_id, signal.SIGSTOP)
+        try:
+            for number in range(100_000):
+                if not web.put(wire.JSON, json.dumps({**frame(2.0 + number), "line": "x" * 2000}).encode()):
+                    break
+            assert web.is_full
+            assert web.put(wire.JSON, json.dumps(frame(1e6)).encode(), last=True)
+        finally:
+            os.kill(web.process_id, signal.SIGCONT)
+        web.close()
+        assert newest(client, 1e6) == 1e6
+
+
 def test_no_other_page_and_no_other_name_gets_in(web: WebProcess) -> None:
     port = web.place.port
     for origin in ("http://evil.example", "http://127.0.0.1:1", "null"):
