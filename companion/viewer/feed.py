@@ -25,7 +25,7 @@ from companion.viewer.map_tiles import TileWatch
 from companion.viewer.retelling import Receiver, Retelling, run_id
 from companion.viewer.steady_frame import SteadyFrame
 
-FRAME_S, TILES_S, SCENE_S = 0.19, 0.04, 2.0
+FRAME_S, TILES_S, SCENE_S = 0.19, 0.09, 2.0
 """So often each is told, in real time."""
 LATE_S, MOST_S = 0.19, 0.25
 """After so long a frame does not keep tiles from being told; a look makes up for no more than so long."""
