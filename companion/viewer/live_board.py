@@ -137,12 +137,11 @@ class LiveBoard:
         self._wake()
 
     def take_tiles(self, message: bytes) -> None:
-        """Tiles of the map."""
+        """Tiles of the map. They are told with the next frame: to wake a browser's task costs more than they do."""
         for place, runs in tiles_in(message):
             self.tiles[place] = runs
             for spectator in self._spectators:
                 spectator.stale.add(place)
-        self._wake()
 
     def end(self) -> None:
         """Nothing more comes of the run: where it has not said that it ended, its program is gone."""

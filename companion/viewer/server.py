@@ -333,22 +333,29 @@ def _listen(app: WebApp, server: uvicorn.Server, loop: asyncio.AbstractEventLoop
     """In a thread: what the run says, to the end."""
     room = threading.Semaphore(MOST_WAITING)
 
-    def take(kind: bytes, payload: bytes) -> None:
+    def take(tiles: list[bytes], payload: bytes) -> None:
         room.release()
-        if kind == wire.TILES:
-            app.board.take_tiles(payload)
-            return
+        for some in tiles:
+            app.board.take_tiles(some)
         message = json.loads(payload)
         if message["kind"] == "answer":
             app.answer(message)
         else:
             app.board.take(message, payload.decode())
 
+    tiles: list[bytes] = []
     with contextlib.suppress(ValueError, OSError, RuntimeError):
         while (message := wire.read_message(sys.stdin.buffer)) is not None:
+            kind, payload = message
+            if kind == wire.TILES:
+                tiles.append(payload)  # nobody is told of them before the next frame: that wakes the loop once for both
+                continue
             room.acquire()  # a server that hangs takes nothing any more: that is noticed at the other end
-            loop.call_soon_threadsafe(take, *message)
+            loop.call_soon_threadsafe(take, tiles, payload)
+            tiles = []
     with contextlib.suppress(RuntimeError):
+        for some in tiles:
+            loop.call_soon_threadsafe(app.board.take_tiles, some)
         loop.call_soon_threadsafe(app.board.end)
     with contextlib.suppress(RuntimeError):  # once everybody has been told the last moment
         loop.call_soon_threadsafe(loop.call_later, LAST_S, setattr, server, "should_exit", True)

@@ -53,17 +53,17 @@ DRAWS = 1000
 SETTLED_S, MEASURED_S = 3.0, 20.0
 FIRST, HALF, AFTER = (round(seconds / TICK_S) for seconds in (SETTLED_S, SETTLED_S + 0.5 * DRIVEN_S, 3.0))
 PARTS = (
-    ("from then on", slice(FIRST, None), 1.25),
-    ("the 3 s from half-way on", slice(HALF, HALF + AFTER), 1.5),
-    ("while browsers start", slice(0, FIRST), 1.5),
+    ("from then on", slice(FIRST, None), 1.25, 0.75),
+    ("the 3 s from half-way on", slice(HALF, HALF + AFTER), 1.5, 0.75),
+    ("while browsers start", slice(0, FIRST), 1.5, 1.0),
 )
-"""Parts of a drive, and how many times as late as without a page the 99th percentile of its ticks may be. The browsers
-start on the same processors, which is not what a page costs; and the short parts have few ticks."""
-TOLD_LIMIT = 0.75
-"""How long the page may be told, as a share of how late a tick ends without one (99 % of both)."""
+"""Parts of a drive; how many times as late as without a page the 99th percentile of its ticks may be; and how long the
+page may be told, as a share of how late a tick ends without one (99 % of both). The browsers start on the same
+processors, which is not what a page costs; and the short parts have few ticks."""
 MEMORY_LIMIT_MB = 60.0
-CPU_LIMIT = 0.025
-"""Of a core of this machine: a tenth of one that is four times as slow, as on a small computer."""
+CPU_LIMIT = 0.5
+"""Of the work of the drive's ticks, so that it is the same on a day on which the machine is slow. They take 0.05 of a
+core here: a fifth of one that is four times as slow, as on a small computer. The page may take a tenth of that one."""
 
 
 def large_mission(folder: Path) -> Path:
@@ -226,7 +226,7 @@ def assert_unchanged(setups: dict[str, Callable[[], np.ndarray]], repetitions: i
             drives[name].append(drive())
     all_ticks = {name: np.array(each) for name, each in drives.items()}
     without, faults = next(iter(all_ticks.values())), []
-    for part_name, part, limit in PARTS:
+    for part_name, part, limit, told_limit in PARTS:
         for searches, which in ((True, "all ticks"), (False, "without a search")):
             print(f"\n{part_name}, {which} ({without[:, 0, part].size} a row): late, work, told; times as late", end="")
             for name, ticks in all_ticks.items():
@@ -236,7 +236,7 @@ def assert_unchanged(setups: dict[str, Callable[[], np.ndarray]], repetitions: i
                     f"\n  {name:16} {late:6.2f} {work:6.2f} {told:6.2f} ms; {times:.2f} ({low:.2f} to {high:.2f})",
                     end="",
                 )
-                if times > limit or told > TOLD_LIMIT * p99_ms(without, LATE, part, searches):
+                if times > limit or told > told_limit * p99_ms(without, LATE, part, searches):
                     faults.append((part_name, which, name, times, told))
     assert not faults
 
@@ -281,14 +281,16 @@ def test_memory_and_processor_of_the_web_process() -> None:
         ticks_of(run, viewer, SETTLED_S, lambda: None)
         served = psutil.Process(viewer.web.process_id)
         began_s, before = time.monotonic(), served.cpu_times()
-        ticks_of(run, viewer, MEASURED_S, lambda: None)
+        ticks = ticks_of(run, viewer, MEASURED_S, lambda: None)
         after, memory = served.cpu_times(), served.memory_full_info()
-        share = (after.user + after.system - before.user - before.system) / (time.monotonic() - began_s)
+        served_s = after.user + after.system - before.user - before.system
+        share, of_ticks = served_s / (time.monotonic() - began_s), 1e3 * served_s / ticks[WORK].sum()
         (got,) = json.loads(people.communicate("", timeout=20.0)[0])
         assert sum(got) > 10_000
     print(
         f"\nweb process with one viewer: RSS {memory.rss / 1e6:.0f} MB, PSS {memory.pss / 1e6:.0f} MB, "
-        f"{100.0 * share:.1f} % of a core, {sum(got) / (SETTLED_S + MEASURED_S) / 1e3:.0f} kB a second"
+        f"{100.0 * share:.1f} % of a core, {of_ticks:.2f} of the ticks' work, "
+        f"{sum(got) / (SETTLED_S + MEASURED_S) / 1e3:.0f} kB a second"
     )
     assert memory.rss / 1e6 < MEMORY_LIMIT_MB
-    assert share < CPU_LIMIT
+    assert of_ticks < CPU_LIMIT

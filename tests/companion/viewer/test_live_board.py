@@ -56,6 +56,20 @@ def test_who_comes_late_is_told_scene_past_map_and_the_newest_frame() -> None:
     assert sorted(places) == [(column, 0) for column in range(TILES_AT_ONCE + 50)]
 
 
+def test_tiles_wake_nobody_and_are_told_before_the_next_frame() -> None:
+    live, woken = board(), []
+    looks_on = live.join(False, lambda: woken.append(1))
+    live.take(frame(0.0))
+    heard(looks_on)
+    woken.clear()
+    live.take_tiles(tile_message([((3, 4), RUNS)]))
+    assert not woken
+    live.take(frame(0.2))
+    tiles, told = looks_on.messages()
+    assert woken == [1] and json.loads(told)["t"] == 0.2
+    assert [place for place, _ in tiles_in(tiles)] == [(3, 4)]
+
+
 @pytest.mark.parametrize("state", ["driving", "ended"])
 def test_a_run_that_never_said_that_it_ended_is_told_as_gone(state: str) -> None:
     live = board()
