@@ -83,20 +83,28 @@ def _listed(record: Record) -> ReplayResult:
 def _explained(record: Record, why: str, image: Path | None) -> ReplayResult:
     """Replay, and explain the decision that was asked for."""
     number = decision_at(record, record_clock(record), why)
-    image = image or record.directory / f"why-{number}.png"
-    picture(image)
+    shown, fault = image or record.directory / f"why-{number}.png", ""
+    try:
+        picture(shown)
+    except OutputError as error:
+        if image is not None:
+            raise
+        fault = f"no picture: {error}; name another place with --image"  # nobody asked for one there
     explainer = DecisionExplainer(number, record.settings, record.mission.rover.turning_radius_m)
     result = watched_replay(record, explainer)
     if explainer.explanation is None:
         raise RecordError(f"{record.directory}: what is left of it ends before decision {number}")
-    _explain(explainer.explanation, image)
-    _tell_how_to_plan(record, explainer.explanation, image)
+    for line in explanation_lines(explainer.explanation):
+        typer.echo(line)
+    if fault:
+        typer.echo(fault, err=True)
+    else:
+        _draw(explainer.explanation, shown)
+        _tell_how_to_plan(record, explainer.explanation, shown)
     return result
 
 
-def _explain(explanation: Explanation, image: Path) -> None:
-    for line in explanation_lines(explanation):
-        typer.echo(line)
+def _draw(explanation: Explanation, image: Path) -> None:
     save_decision(image, explanation)
     typer.echo(f"picture: {image}")
     if (choice := explanation.motions) is not None:

@@ -82,7 +82,7 @@ def web_place(text: str, token_file: Path | None) -> WebPlace:
     """
     host, _, port_text = text.rpartition(":")
     host = host.removeprefix("[").removesuffix("]") or "127.0.0.1"
-    if not port_text.isascii() or not port_text.isdigit() or not 0 <= int(port_text) <= 65535:
+    if not port_text.isascii() or not port_text.isdigit() or int(port_text) > 65535 or not _may_be_host(host):
         raise WebError(f"--web {text}: not a place to serve; use PORT (at most 65535) or HOST:PORT, for example 8000")
     place = WebPlace(host, int(port_text), "" if token_file is None else _token(token_file))
     if place.private and not place.token:
@@ -124,6 +124,17 @@ def _token(file: Path) -> str:
             f"--web-token {file}: a token is one word of {LEAST_TOKEN} letters or more; delete the file for a new one"
         )
     return token
+
+
+def _may_be_host(host: str) -> bool:
+    """Whether it is written as a name or an address."""
+    if ":" not in host:
+        return not any(letter.isspace() or letter in "/[]@" for letter in host)
+    try:
+        ipaddress.IPv6Address(host)
+    except ValueError:
+        return False
+    return True
 
 
 def _is_loopback(host: str) -> bool:

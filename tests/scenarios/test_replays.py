@@ -250,7 +250,7 @@ def test_a_decision_that_a_cut_record_does_not_reach_is_not_explained(record: Pa
 
 
 @pytest.mark.thorough
-def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
+def test_why_a_decision_was_made_is_shown(record: Path, copy: Path, tmp_path: Path) -> None:
     lines = load_record(record).decisions
     number = 1 + next(i for i, line in enumerate(lines) if i and json.loads(line)["searches"])
     picture = tmp_path / "why.png"
@@ -269,6 +269,10 @@ def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
     again = CliRunner().invoke(app, [*words, "--json"])
     assert name == "rover-companion" and again.exit_code == 0, again.output
     assert json.loads(again.stdout)["path"][-1] == [int(word) for word in words[words.index("--target") + 1].split(",")]
+    (copy / f"why-{number}.png").mkdir()
+    without = CliRunner().invoke(app, ["replay", str(copy), "--why", str(number)])
+    assert without.exit_code == 0 and without.stdout.startswith(f"decision {number} at ")
+    assert "no picture: " in without.stderr and "with --image" in without.stderr and "picture: " not in without.stdout
     late = CliRunner().invoke(app, ["replay", str(record), "--why", "100000"])
     assert late.exit_code == 2 and "the last one is" in late.output
 

@@ -1,6 +1,8 @@
 // Drawing helpers that all layers share: lines through places, texts with a halo, labels that do not overlap.
 
 const FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif";
+/** Between two names side by side there is twice as much: else they read as one. */
+const GAP_PX = 2;
 
 /** What a layer draws with. It always works in pixels of the page; places are turned into pixels one by one. */
 export class Pen {
@@ -91,7 +93,9 @@ export class Pen {
       left + width < this.camera.width - this.camera.coveredRight &&
       top > 4 &&
       top + high < this.camera.height - this.camera.covered - 4;
-    const spot = spots.find((each) => inside(each) && this.claim(each[0], each[1], width, high));
+    const spot = spots.find(
+      (each) => inside(each) && this.claim(each[0] - GAP_PX, each[1], width + 2 * GAP_PX, high),
+    );
     if (spot) this.text(text, spot[0], spot[1] + high / 2, options);
     return Boolean(spot);
   }

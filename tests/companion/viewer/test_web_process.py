@@ -321,6 +321,8 @@ def test_places_and_tokens(tmp_path: Path) -> None:
         ("0.0.0.0:8000", None, "--web-token FILE"),
         ("http://localhost", None, "not a place"),
         ("70000", None, "not a place"),
+        ("a b:8000", None, "not a place"),
+        ("127.0.0.1:8000:9", None, "not a place"),
         ("8000", tmp_path, "is a folder; name a file"),
         ("8000", Path("/dev/null"), "is no ordinary file"),
         ("8000", tmp_path / "none" / "token", "there is no folder"),
