@@ -65,16 +65,26 @@ class Spectator:
                 told.append(json.dumps(board.past.message))
                 self._news = board.news_count
         told += [json.dumps(self._answers.popleft()) for _ in range(len(self._answers))]
-        out: list[str | bytes] = [*told]
-        if board.scene is not None and self.stale:
-            places = [self.stale.pop() for _ in range(min(TILES_AT_ONCE, len(self.stale)))]
-            out.append(tile_message([(place, board.tiles[place]) for place in places if place in board.tiles]))
-        if board.frame is not None and board.frame_count != self._frame:
-            self._frame = board.frame_count
-            all_told = self._news == board.news_count - len(board.frame["news"])
-            out.append(board.frame_text if all_told else board.frame_with(board.news_since(self._news)))
-            self._news = board.news_count
-        return out
+        tiles, frames = self._tiles(), self._frames()
+        # How a run ended does not wait for a map that may take long.
+        return [*told, *frames, *tiles] if board.has_ended else [*told, *tiles, *frames]
+
+    def _tiles(self) -> list[bytes]:
+        board = self._board
+        if board.scene is None or not self.stale:
+            return []
+        places = [self.stale.pop() for _ in range(min(TILES_AT_ONCE, len(self.stale)))]
+        return [tile_message([(place, board.tiles[place]) for place in places if place in board.tiles])]
+
+    def _frames(self) -> list[str]:
+        board = self._board
+        if board.frame is None or board.frame_count == self._frame:
+            return []
+        self._frame = board.frame_count
+        all_told = self._news == board.news_count - len(board.frame["news"])
+        text = board.frame_text if all_told else board.frame_with(board.news_since(self._news))
+        self._news = board.news_count
+        return [text]
 
 
 class LiveBoard:
@@ -145,9 +155,14 @@ class LiveBoard:
 
     def end(self) -> None:
         """Nothing more comes of the run: where it has not said that it ended, its program is gone."""
-        if self.frame is not None and self.frame["state"] != "ended":
+        if self.frame is not None and not self.has_ended:
             line, why = f"ended, {EndReason.GONE.value}", WHERE if self._is_simulated else TAKE_OVER
             self.take({**self.frame, "news": [], "state": "ended", "line": line, "why": why, **NOBODY_DRIVES})
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the run has said so."""
+        return self.frame is not None and self.frame["state"] == "ended"
 
     @property
     def _is_simulated(self) -> bool:
@@ -166,6 +181,7 @@ class LiveBoard:
         """Of before this process: nobody is told of it until the scene has come, too."""
         if piece["anew"]:  # what came in time from the process before is told again
             self.scene, self.frame, self.past = None, None, Past()
+            self.tiles.clear()
         self.past.join(piece)
         self.news_count += len(piece["news"])
 

@@ -48,6 +48,9 @@ NEEDED = ("starlette", "uvicorn", "websockets")
 TOKEN_BYTES = 16
 LEAST_TOKEN, MOST_TOKEN_BYTES = 8, 1000
 
+WAKE = (b"", b"")
+"""No message: whoever waits for one looks round."""
+
 Json = dict[str, Any]
 
 
@@ -224,7 +227,8 @@ class WebProcess:
         )  # fmt: skip
         _yield(process.pid)
         self._process, self.started = process, self.started + 1
-        hearing = threading.Thread(target=self._hear, args=(process,), name="web requests", daemon=True)
+        gone = threading.Event()
+        hearing = threading.Thread(target=self._hear, args=(process, gone), name="web requests", daemon=True)
         hearing.start()
         try:
             assert process.stdin is not None
@@ -233,7 +237,10 @@ class WebProcess:
             self._drain()
             self.begins_anew.set()
             while (message := self._queue.get()) is not None:
-                self._write(process, *message)
+                if gone.is_set():
+                    return
+                if message is not WAKE:
+                    self._write(process, *message)
             process.stdin.close()
             process.wait(CLOSE_S)
         except subprocess.TimeoutExpired:
@@ -274,15 +281,20 @@ class WebProcess:
                     self._closing.set()
                     return
 
-    def _hear(self, process: subprocess.Popen[bytes]) -> None:
-        """In a thread: what browsers ask for. A process that says anything else is ended, and another one begun."""
+    def _hear(self, process: subprocess.Popen[bytes], gone: threading.Event) -> None:
+        """In a thread: what browsers ask for, until the process ends or says anything else; ``gone`` is set then.
+
+        It is seen here at once: there may be nothing to write, as while the run compiles.
+        """
         assert process.stdout is not None
         with contextlib.suppress(OSError, ValueError):  # its end
             while line := process.stdout.readline(MOST_LINE_BYTES):
                 if (asked := _asked(line)) is None:
-                    process.kill()
-                    return
+                    break
                 self._asked.append(asked)
+        gone.set()
+        with contextlib.suppress(queue.Full):
+            self._queue.put_nowait(WAKE)
 
 
 def _asked(line: bytes) -> Json | None:

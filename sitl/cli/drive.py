@@ -141,8 +141,8 @@ def drive(
         if not is_interrupt(error):
             raise
         _print_last(painter, rows_below=1)
-        _keep(run, recorder)
-        raise StoppedError(_stopped(run, recorder if record else NullRecorder())) from None
+        kept = _kept(run, recorder, wanted, console)
+        raise StoppedError(f"{_stopped(run)}; {'; '.join(kept) or 'nothing was written'}") from None
     recorder.close(ended_by=run.ended_by(EndReason.TIME_LIMIT))
     _print_results(report, console, mission, settings)
     _print_last(painter, wanted.lines + isinstance(recorder, Recorder))
@@ -187,30 +187,36 @@ def _file(sensors: str | None) -> Path | None:
     return Path(sensors) if sensors is not None and sensors.endswith(".toml") else None
 
 
-def _keep(run: Drive | None, recorder: Recorder | NullRecorder) -> None:
-    """What was recorded of a drive that was interrupted."""
+def _kept(run: Drive | None, recorder: Recorder | NullRecorder, wanted: Outputs, console: Console) -> list[str]:
+    """What was recorded of a drive that was interrupted is kept, and its report written; tells where they are."""
     stopped = EndReason.STOPPED_BY_USER
     recorder.close(ended_by=stopped if run is None else run.ended_by(stopped))
-    if run is not None and isinstance(recorder, Recorder) and not recorder.problem:
+    if not isinstance(recorder, Recorder):
+        return []
+    kept = []
+    if run is not None and not recorder.problem:
         with contextlib.suppress(OutputError, MapError):  # the program ends with what it can say
             complete_record(run, recorder)
-
-
-def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
-    """What was interrupted, and where its record is."""
-    if run is None:
-        what = "before the first metre"
-    else:
-        reached = sum(status is TargetStatus.REACHED for _, status in run.companion.statuses())
-        targets = f"{reached} of {len(run.mission.targets)} targets reached"
-        touched = len(run.simulator.collisions)
-        told = f", {touched} collision{'s' * (touched != 1)}" if touched else ""
-        what = f"{run.mission.name} after {run.simulator.time_s:.0f} s of simulated time, {targets}{told}"
-    kept = "nothing was written"
-    if isinstance(recorder, Recorder):
+        try:
+            line = wanted.write_report(recorder, console, run)
+            kept += [line.replace("report:  ", "report: ", 1)] if line else []
+        except (OutputError, MapError, RecordError) as error:
+            kept.append(f"no report: {error}")
+    if wanted.record is not None:
         told = recorder.problem or f"record so far: {recorder.directory}"
-        kept = f"{told}; rover-companion report {recorder.directory} shows it"
-    return f"{what}; {kept}"
+        kept.append(f"{told}; rover-companion report {recorder.directory} shows it")
+    return kept
+
+
+def _stopped(run: Drive | None) -> str:
+    """What was interrupted."""
+    if run is None:
+        return "before the first metre"
+    reached = sum(status is TargetStatus.REACHED for _, status in run.companion.statuses())
+    targets = f"{reached} of {len(run.mission.targets)} targets reached"
+    touched = len(run.simulator.collisions)
+    told = f", {touched} collision{'s' * (touched != 1)}" if touched else ""
+    return f"{run.mission.name} after {run.simulator.time_s:.0f} s of simulated time, {targets}{told}"
 
 
 def _warn(text: str) -> None:

@@ -85,7 +85,7 @@ class Outputs:
         All are written even if one fails; then raises OutputError.
         """
         problems = []
-        report = partial(self._write_report, recorder, console)
+        report = partial(self.write_report, recorder, console)
         end = partial(self._end_record, recorder)
         for write in (end, self._write_image, self._write_map, self._write_figures, report):
             try:
@@ -120,8 +120,8 @@ class Outputs:
         complete_record(run, recorder)
         return "" if self.record is None else f"record:  {recorder.directory}"
 
-    def _write_report(self, recorder: Recorder | NullRecorder, console: Console, run: Drive) -> str:
-        """Of the record as it lies there now."""
+    def write_report(self, recorder: Recorder | NullRecorder, console: Console, run: Drive) -> str:
+        """Of the record as it lies there now, if it is asked for. Raises OutputError, MapError, RecordError."""
         if self.report is None or not isinstance(recorder, Recorder):
             return ""
         with console.status("writing the report ..."):

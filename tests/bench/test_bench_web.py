@@ -61,9 +61,10 @@ PARTS = (
 page may be told, as a share of how late a tick ends without one (99 % of both). The browsers start on the same
 processors, which is not what a page costs; and the short parts have few ticks."""
 MEMORY_LIMIT_MB = 60.0
-CPU_LIMIT = 0.5
+CPU_LIMIT, SLOW_DAY_LIMIT = 0.5, 0.05
 """Of the work of the drive's ticks, so that it is the same on a day on which the machine is slow. They take 0.05 of a
-core here: a fifth of one that is four times as slow, as on a small computer. The page may take a tenth of that one."""
+core here: a fifth of one that is four times as slow, as on a small computer. The page may take a tenth of that one. And
+of a core of this machine, twice as much as that would be: on some days it is half as fast."""
 
 
 def large_mission(folder: Path) -> Path:
@@ -293,4 +294,4 @@ def test_memory_and_processor_of_the_web_process() -> None:
         f"{sum(got) / (SETTLED_S + MEASURED_S) / 1e3:.0f} kB a second"
     )
     assert memory.rss / 1e6 < MEMORY_LIMIT_MB
-    assert of_ticks < CPU_LIMIT
+    assert of_ticks < CPU_LIMIT and share < SLOW_DAY_LIMIT

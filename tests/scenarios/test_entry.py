@@ -164,11 +164,11 @@ def test_the_version_is_told(name: str) -> None:
 
 
 @first_of(1, ("number", "word"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
-def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
+def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_and_report_are(
     tmp_path: Path, number: signal.Signals, word: str
 ) -> None:
-    record = tmp_path / "record"
-    command = ("drive", "missions/rooms.toml", "--sensors", "beams", "--record", record)
+    record, report = tmp_path / "record", tmp_path / "report.html"
+    command = ("drive", "missions/rooms.toml", "--sensors", "beams", "--record", record, "--report", report)
     # A shell's job in the background would ignore Ctrl-C, and all that it starts.
     heeded = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
     with process("sitl", *command, first=heeded) as child:
@@ -177,7 +177,8 @@ def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
         code, _, errors = finished(child)
     assert code == 130 and errors.count("\n") == 1
     assert errors.startswith(f"stopped by {word}: Rooms after ") and "0 of 1 targets reached" in errors
-    assert errors.endswith(f"record so far: {record}; rover-companion report {record} shows it\n")
+    assert f"; report: {report} (" in errors and report.read_text().endswith("</html>\n")
+    assert errors.endswith(f"; record so far: {record}; rover-companion report {record} shows it\n")
     assert load_record(record).meta.end_reason is EndReason.STOPPED_BY_USER
     assert all((record / name).stat().st_size > 0 for name in ("link.tlog", "map.yaml", "map.pgm"))
 

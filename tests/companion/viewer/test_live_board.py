@@ -70,6 +70,24 @@ def test_tiles_wake_nobody_and_are_told_before_the_next_frame() -> None:
     assert [place for place, _ in tiles_in(tiles)] == [(3, 4)]
 
 
+def test_the_end_is_told_before_a_map_that_may_take_long() -> None:
+    live = board()
+    live.take_tiles(tile_message([((3, 4), RUNS)]))
+    live.take({**frame(1.0), "state": "ended"})
+    looks_on = live.join(False, lambda: None)
+    *_, told, tiles = looks_on.messages()
+    assert json.loads(told)["state"] == "ended" and [place for place, _ in tiles_in(tiles)] == [(3, 4)]
+
+
+def test_a_process_that_begins_anew_forgets_the_map_that_came_in_time() -> None:
+    live = board()
+    live.take_tiles(tile_message([((0, 0), RUNS)]))
+    live.take({"kind": "past", "anew": True, "frames": [], "news": [], "track": []})
+    live.take({**SCENE, "map_epoch": 2})
+    live.take_tiles(tile_message([((7, 7), RUNS)]))
+    assert heard(live.join(False, lambda: None))[1] == [(7, 7)]
+
+
 @pytest.mark.parametrize("state", ["driving", "ended"])
 def test_a_run_that_never_said_that_it_ended_is_told_as_gone(state: str) -> None:
     live = board()

@@ -215,6 +215,39 @@ def test_it_is_started_again_and_told_anew_when_it_is_killed(web: WebProcess) ->
     assert web.process_id != first
 
 
+def test_it_is_started_again_while_the_run_has_nothing_to_tell(web: WebProcess) -> None:
+    """As while it compiles."""
+    assert web.process_id is not None
+    os.kill(web.process_id, signal.SIGKILL)
+    wait_until(lambda: web.started == 2)
+    begin(web)
+
+
+def columns_until(client: ClientConnection, until_s: float) -> list[int]:
+    """The columns of the tiles that are told before the frame of this time."""
+    columns: list[int] = []
+    while True:
+        message = client.recv(WAIT_S)
+        if isinstance(message, bytes):
+            columns += [column for (column, _), _ in wire.tiles_in(message)]
+        elif (told := json.loads(message))["kind"] == "frame" and told["t"] == until_s:
+            return columns
+
+
+def test_a_piece_of_the_map_is_told_once_and_before_the_frame_after_it(web: WebProcess) -> None:
+    runs = run_lengths(np.ones((64, 64), np.uint8))
+    with looking(web) as client:
+        next_of(client, "scene")
+        for number in range(3):
+            web.put(wire.TILES, wire.tile_message([((number, 4), runs)]))
+            web.put(wire.JSON, json.dumps(frame(1.0 + number)).encode())
+            assert columns_until(client, 1.0 + number) == [number]
+        for number, message in ((5, {**SCENE, "map_epoch": 2}), (6, frame(9.0))):
+            web.put(wire.TILES, wire.tile_message([((number, 4), runs)]))
+            web.put(wire.JSON, json.dumps(message).encode())
+        assert columns_until(client, 9.0) == [6], "the other one is of the map before"
+
+
 def test_a_process_that_stalls_costs_moments_and_no_time(web: WebProcess) -> None:
     process_id = web.process_id
     assert process_id is not None
