@@ -19,8 +19,8 @@ from companion.control.motion_controller import (
     _latest,
     rover_model,
 )
-from companion.control.motion_kernels import clearance_m, moved
-from companion.control.motion_planners import motion_planner
+from companion.control.motion_kernels import MotionProblem, clearance_m, moved
+from companion.control.motion_planners import Found, motion_planner
 from companion.control.motion_prediction import braked_m
 from companion.control.reference_path import ReferencePath, advanced
 from companion.control.told import Told, ToldVelocity, after
@@ -404,6 +404,34 @@ def test_without_a_guard_what_is_told_is_safe_whether_it_is_obeyed_late_or_soon(
         assert leads.choice is not None
         admitted.append(leads.choice.problem.admitted_m_s)
     assert np.all(admitted[0] <= admitted[1]) and admitted[0].sum() < 0.9 * admitted[1].sum()
+
+
+class Wants:
+    """Stands in for a planner that always wants this speed, straight on."""
+
+    def __init__(self, speed_m_s: float) -> None:
+        motion = np.zeros((6, 2))
+        motion[:, 0] = speed_m_s
+        self._found = Found(motion, 1.0, motion[None], np.ones(1))
+
+    def plan(self, problem: MotionProblem, passed_s: float) -> Found:
+        return self._found
+
+    def forget(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize("wanted_m_s", [0.4, -0.4])
+def test_a_rover_that_rolls_stands_before_it_is_told_to_go_the_other_way(wanted_m_s: float) -> None:
+    """Else the autopilot's integral, full from braking, would push it on when it is told to stand again."""
+    leads = MotionController(FOOTPRINT, Wants(wanted_m_s))
+    at = replace(view(ground(), Pose(5.0, 10.0, 0.0, 0.0), 0.3), rolls_back=wanted_m_s > 0.0)
+    for speed_m_s, purpose, told_m_s in ((0.3, Purpose.BRAKE, 0.0), (0.08, Purpose.DRIVE, wanted_m_s)):
+        command = leads.follow(PATH, replace(at, speed_m_s=speed_m_s))
+        assert isinstance(command.setpoint, GuidedVelocity)
+        assert (command.purpose, command.setpoint.forward_m_s) == (purpose, told_m_s)
+    same_way = replace(at, rolls_back=wanted_m_s < 0.0)
+    assert leads.follow(PATH, same_way).purpose is Purpose.DRIVE
 
 
 def test_it_foresees_that_it_backs_off() -> None:
