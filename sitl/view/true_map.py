@@ -35,11 +35,6 @@ class TrueMap:
         self._waiting: deque[Place] = deque()
         self.tell_again()
 
-    @property
-    def is_behind(self) -> bool:
-        """Whether there are tiles that must still be told."""
-        return bool(self._waiting)
-
     def tell_again(self) -> None:
         """Whoever was told has forgotten it."""
         rows, columns = self._classes.shape
