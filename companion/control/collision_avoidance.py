@@ -77,6 +77,11 @@ ARC_M, ARC_M_S, ARC_SHARES = 2.5, 0.7, (0.0, -1.0, 1.0)
 """How far, how fast and with which shares of the sharpest curvature a rover drives off that cannot turn on the spot."""
 
 
+REMEMBERS_S = 5.0
+"""What left the view because the rover turned off, to stop for it, is expected to go on for so long.
+
+After 3 s a walker who was taken for a tenth faster than he was had not passed yet.
+"""
 STEPS_M = 0.02
 """A way that gets on by less between two moments says nothing of the heading."""
 
@@ -227,13 +232,34 @@ def _may_be_the_last(command: ControlCommand, view: LocalView, discs: Points) ->
 
 
 class CollisionAvoidance:
-    """Remembers whether the rover stops or moves aside, and since when avoiding has kept it from getting on."""
+    """Remembers whether the rover stops or moves aside, what it turned off for, and since when it does not get on."""
 
     def __init__(self) -> None:
         self._aside_rad: float | None = None
         self._stops = False
         self._turned_rad_s = 0.0
         self._since_s: float | None = None
+        self._turned_off_for: dict[str, tuple[Moving, float]] = {}
+        """By name: what the rover turned off for, as it was known last, and when."""
+
+    def with_what_it_turned_off_for(self, moving: tuple[Moving, ...], now_s: float) -> tuple[Moving, ...]:
+        """``moving``, and what the rover turned off for, where that is not among it any more.
+
+        Turned away the rover does not see it, and turned back it may stand in front of it: while it turns quickly it
+        sees nothing that moves (`companion/perception/object_tracker.py`).
+        """
+        for one in moving:
+            if one.name in self._turned_off_for or self._turned_rad_s != 0.0:
+                self._turned_off_for[one.name] = (one, now_s)
+        self._turned_off_for = {
+            name: (one, known_s)
+            for name, (one, known_s) in self._turned_off_for.items()
+            if now_s - known_s < REMEMBERS_S
+        }
+        if not moving and not self._turned_off_for:
+            self._turned_rad_s = 0.0
+        names = {one.name for one in moving}
+        return moving + tuple(one for name, (one, _) in self._turned_off_for.items() if name not in names)
 
     def avoid(
         self,

@@ -194,6 +194,7 @@ class GoalDriver:
     def guide(self, view: LocalView, moving: tuple[Moving, ...] = ()) -> ControlCommand:
         """The command for this tick: along the path, and out of the way of what moves."""
         self.makes_way, command = False, self._follow(view)
+        moving = self._avoidance.with_what_it_turned_off_for(moving, view.pose.time_s)
         if not moving or (self.decision is not None and self.decision.action is Action.REACHED):
             return command
         command, yields = self._avoided(command, view, moving)

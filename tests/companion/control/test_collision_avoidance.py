@@ -246,6 +246,36 @@ def test_where_stopping_straight_on_would_touch_it_turns_off_while_it_stops() ->
     assert told(crossing(-3.0, 1.2)) == stop_for(Purpose.BRAKE)
 
 
+def test_what_it_turned_off_for_is_expected_to_go_on_when_it_is_out_of_view() -> None:
+    """For five seconds since it was known last; what left the view of a rover that went straight on is not."""
+    on, turns = DRIVE, ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, 1.5), 0.0)
+    walker, cart = crossing(2.1, -0.9, 22.9), replace(crossing(-3.0, 1.2), name="cart")
+
+    def turned_stops(times_s: Points) -> list[tuple[ControlCommand, Points]]:
+        return [(turns, moved_on_arc(HERE, 0.0, 0.75, braked_m(1.9, times_s, SETTINGS.guidance)))]
+
+    def led_past(moving: Moving, now_s: float) -> CollisionAvoidance:
+        led = CollisionAvoidance()
+        led.with_what_it_turned_off_for((moving,), now_s)
+        option = led.avoid(
+            on, PATH, view(1.9), (moving,), backwards=False, foresees=drives_on, turned_stops=turned_stops
+        )
+        assert (option.command == turns) is (moving is walker)
+        led.with_what_it_turned_off_for((moving,), now_s + 0.1)
+        return led
+
+    off = led_past(walker, 100.0)
+    assert off.with_what_it_turned_off_for((), 101.0) == (walker,)
+    later = replace(walker, time_s=103.0)
+    assert off.with_what_it_turned_off_for((later,), 103.05) == (later,), "seen again, it counts once"
+    assert off.with_what_it_turned_off_for((), 108.0) == (later,)
+    assert off.with_what_it_turned_off_for((), 108.1) == ()
+    assert off.with_what_it_turned_off_for((cart,), 109.0) == (cart,)
+    assert off.with_what_it_turned_off_for((), 109.1) == (), "it does not turn any more"
+    straight = led_past(cart, 100.0)
+    assert straight.with_what_it_turned_off_for((), 101.0) == ()
+
+
 @pytest.mark.parametrize("speed_m_s", [1.0, 1.5, 1.9])
 @pytest.mark.parametrize("gap_m", [0.05, 0.2, 0.6, 1.0])
 def test_told_to_go_slower_it_stops_before_what_comes_straight_at_it(speed_m_s: float, gap_m: float) -> None:
