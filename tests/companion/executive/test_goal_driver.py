@@ -6,6 +6,7 @@ import numpy as np
 
 from companion.control.controller import ControlCommand, Purpose
 from companion.control.local_view import LocalView
+from companion.control.motion_prediction import Points, braked_m, moved_on_arc
 from companion.control.point_controller import PointController
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
@@ -18,6 +19,7 @@ from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Decision, NavState
 from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import InlineRunner, StepCall, StepRunner, ThreadRunner
+from companion.perception.moving_obstacles import Moving
 from companion.planning.registry import make_planner
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity
@@ -69,10 +71,10 @@ def seen_map(pose: Pose) -> EvidenceMap:
 class Drive:
     """A goal driver on one map that the rover stands on."""
 
-    def __init__(self, runner: StepRunner) -> None:
+    def __init__(self, runner: StepRunner, controller: PointController | None = None) -> None:
         planner = make_planner("hybrid", SETTINGS.planner)
         searcher = PathSearcher(planner, np.random.default_rng(1))
-        self.driver = GoalDriver(PointController(), searcher, runner)
+        self.driver = GoalDriver(controller or PointController(), searcher, runner)
         self.evidence = seen_map(Pose(20.5, 20.5, 0.0, 0.0))
 
     def at(self, time_s: float, speed_m_s: float = 0.0) -> LocalView:
@@ -177,3 +179,26 @@ def test_a_rover_faster_than_it_may_be_is_braked() -> None:
     surging, _ = one.update(0.2, 2.4)
     assert (surging.purpose, surging.setpoint) == (Purpose.BRAKE, GuidedVelocity(0.0, 0.0))
     assert one.update(0.3, 2.2)[0].purpose is Purpose.DRIVE
+
+
+class TurnsOff(PointController):
+    """May turn to the right while it stops."""
+
+    def turned_stops(self, view: LocalView, times_s: Points) -> tuple[tuple[ControlCommand, Points], ...]:
+        rolls_m = braked_m(view.speed_m_s, times_s, view.settings.guidance)
+        command = ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, 1.5), 0.0)
+        return ((command, moved_on_arc(view.pose, 0.0, 0.75, rolls_m)),)
+
+
+def test_it_makes_way_on_for_what_it_turned_off_for_when_that_is_out_of_view() -> None:
+    walker = Moving("seen 1", 0.1, NedPoint(23.4, 22.6), 0.0, -0.9, 0.5)
+    one = Drive(InlineRunner(), TurnsOff())
+    one.head_for(target(32.5, 20.5))
+    assert one.update(0.0, 1.9)[0].purpose is Purpose.DRIVE
+    told = one.driver.guide(one.at(0.1, 1.9), (walker,))
+    assert (told.purpose, told.setpoint) == (Purpose.BRAKE, GuidedVelocity(0.0, 1.5))
+    one.driver.guide(one.at(0.2, 1.7), (walker,))
+    one.driver.guide(one.at(0.3, 1.5))
+    assert one.driver.makes_way
+    assert one.driver.guide(one.at(6.0, 1.5)).purpose is Purpose.DRIVE
+    assert not one.driver.makes_way
