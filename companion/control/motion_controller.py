@@ -73,6 +73,8 @@ TURNS_BACK_M_S = 0.1
 """A rover that rolls faster is told to stand before it is told to go the other way. ArduRover's integral is full from
 braking and is emptied only where it has stopped (``ATC_STOP_SPEED``): else the rover rolls on for seconds, told to
 stand, at 0.2 m/s (2.2 s to a third)."""
+STANDS_SOON_S = 0.03
+"""A rover that brakes so hard that it stands after so long need not wait for it: the integral has had no time to fill."""
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
 """Turn rates for which the fastest speed is looked for that may be told, as shares of the fastest."""
 NONE_ADMITTED = np.zeros((len(TURN_SHARES), 2))
@@ -238,7 +240,8 @@ class MotionController:
     def _safe(self, wanted: NDArray[np.float64], view: LocalView, worst: Problems) -> ToldVelocity:
         """This command, or a slower one, or the best way to brake."""
         now_s, speed_m_s, turn_rad_s = self._time_s, float(wanted[0]), float(wanted[1])
-        if speed_m_s * view.forward_m_s < 0.0 and abs(view.forward_m_s) > TURNS_BACK_M_S:
+        rolls_m_s = max(TURNS_BACK_M_S, STANDS_SOON_S * view.following.deceleration_m_s2)
+        if speed_m_s * view.forward_m_s < 0.0 and abs(view.forward_m_s) > rolls_m_s:
             speed_m_s = 0.0
         for share in SHARES:
             # On the same arc; a rover that hardly moves keeps its turn rate.

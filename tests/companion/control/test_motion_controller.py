@@ -434,6 +434,14 @@ def test_a_rover_that_rolls_stands_before_it_is_told_to_go_the_other_way(wanted_
     assert leads.follow(PATH, same_way).purpose is Purpose.DRIVE
 
 
+def test_a_rover_that_brakes_hard_is_told_to_go_the_other_way_at_once() -> None:
+    """It stands within a moment: no integral has had the time to fill."""
+    at = replace(view(ground(), Pose(5.0, 10.0, 0.0, 0.0), 0.3), rolls_back=True)
+    for brakes_m_s2, purpose in ((9.0, Purpose.BRAKE), (15.0, Purpose.DRIVE)):
+        hard = replace(at, following=at.following._replace(deceleration_m_s2=brakes_m_s2))
+        assert MotionController(FOOTPRINT, Wants(0.4)).follow(PATH, hard).purpose is purpose
+
+
 def test_it_foresees_that_it_backs_off() -> None:
     """Before a wall, with the path behind it, it begins tail first or turns: not on towards the wall."""
     evidence = ground()
