@@ -74,7 +74,7 @@ TURNS_BACK_M_S = 0.1
 braking and is emptied only where it has stopped (``ATC_STOP_SPEED``): else the rover rolls on for seconds, told to
 stand, at 0.2 m/s (2.2 s to a third)."""
 STANDS_SOON_S = 0.03
-"""A rover that brakes so hard that it stands after so long need not wait for it: the integral has had no time to fill."""
+"""A rover that brakes so hard that it stands after so long need not wait: the integral has had no time to fill."""
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
 """Turn rates for which the fastest speed is looked for that may be told, as shares of the fastest."""
 NONE_ADMITTED = np.zeros((len(TURN_SHARES), 2))
