@@ -75,8 +75,9 @@ class MotionGa:
         seeds = constant_motions(problem.model)
         keep_all_within(seeds, problem)
         keep_all_within(motions, problem)
-        best = np.argsort(costs_s(seeds, problem))[: self.SEEDS]
-        motions[np.argsort(self._costs)[-self.SEEDS :]] = seeds[best]
+        # Stable: equally bad ones are many, and in which order another sort leaves them depends on the processor.
+        best = np.argsort(costs_s(seeds, problem), kind="stable")[: self.SEEDS]
+        motions[np.argsort(self._costs, kind="stable")[-self.SEEDS :]] = seeds[best]
         chances = rng.random((self.GENERATIONS, self.POPULATION, KNOTS + 4))
         kicks = rng.standard_normal((self.GENERATIONS, self.POPULATION, KNOTS, 2))
         self._costs = costs = evolve(motions, self.POPULATION // 4, chances, kicks, self.SIZES, problem)

@@ -257,7 +257,7 @@ def _alone(scan: RangeScan) -> tuple[NDArray[np.int64], dict[int, int]]:
     And on which side the edge of a fan cuts one off, by its number: 1 to the right, -1 to the left.
     """
     bearings = np.mod(scan.bearing_rad + math.pi, 2.0 * math.pi)
-    order = np.argsort(bearings)
+    order = np.argsort(bearings, kind="stable")
     ordered_rad = bearings[order]
     before_rad = np.concatenate((ordered_rad[-1:] - 2.0 * math.pi, ordered_rad[:-1]))
     gaps = ordered_rad - before_rad

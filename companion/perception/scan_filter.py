@@ -151,7 +151,7 @@ def _same(one: RangeScan, other: RangeScan) -> bool:
 
 
 def _same_turn(one: RangeScan, other: RangeScan) -> bool:
-    order = np.argsort(one.bearing_rad)
+    order = np.argsort(one.bearing_rad, kind="stable")
     bearing_rad = one.bearing_rad[order]
     right = np.searchsorted(bearing_rad, other.bearing_rad).clip(1, max(len(bearing_rad) - 1, 1))
     right = np.minimum(right, len(bearing_rad) - 1)

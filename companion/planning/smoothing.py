@@ -226,7 +226,11 @@ def smooth(weights: Weights, cells: CellArray) -> Curve:
 
 @njit(cache=True, nogil=True)
 def curve_cost(weights: Weights, curve: Curve) -> float:
-    """The cost of driving along a curve: its length in fields times the weight of the fields under it."""
+    """The cost of driving along a curve: its length in fields times the weight of the fields under it.
+
+    Off the map, where a genetic curve may lead between its way points, it is that of an obstacle.
+    """
+    height, width = weights.shape
     total = 0.0
     for i in range(1, len(curve)):
         along_x, along_y = curve[i, 0] - curve[i - 1, 0], curve[i, 1] - curve[i - 1, 1]
@@ -235,6 +239,8 @@ def curve_cost(weights: Weights, curve: Curve) -> float:
         for k in range(pieces):
             share = (k + 0.5) / pieces
             x, y = curve[i - 1, 0] + share * along_x, curve[i - 1, 1] + share * along_y
-            weight = weights[math.floor(y + 0.5), math.floor(x + 0.5)]
+            row, column = math.floor(y + 0.5), math.floor(x + 0.5)
+            is_on_map = 0 <= row < height and 0 <= column < width
+            weight = weights[row, column] if is_on_map else OBSTACLE
             total += (GRAZED_WEIGHT if weight >= OBSTACLE else max(weight, MIN_WEIGHT)) * length / pieces
     return total

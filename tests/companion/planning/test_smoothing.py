@@ -137,6 +137,20 @@ def test_what_driving_along_a_curve_costs():
     assert curve_cost(weights, np.array([[1.0, 1.0]])) == 0.0
 
 
+@pytest.mark.parametrize("by", [(0.0, 3.0), (0.0, -3.0), (6.0, 0.0), (-6.0, 0.0)])
+def test_off_the_map_a_curve_costs_what_an_obstacle_does(by: tuple[float, float]) -> None:
+    """A genetic curve may bulge over the edge between its way points. What lies in memory there must not count."""
+    memory = np.full((11, 15), 0.123)
+    weights = memory[4:7, 5:10]
+    weights[:] = 0.5
+    inside, outside = np.array([[2.0, 1.0], [2.0, 1.0]]), np.array([[2.0, 1.0], [2.0, 1.0]])
+    outside[1] += by
+    inside[1] += np.clip(by, -1.4, 1.4)
+    length, within = float(np.abs(by).sum()), 0.5 * (1.5 if by[0] == 0.0 else 2.5)
+    assert curve_cost(weights, outside) == pytest.approx(within + 10.0 * (length - within / 0.5))
+    assert curve_cost(weights, inside) == pytest.approx(0.5 * 1.4)
+
+
 def test_taut_keeps_a_field_of_room_at_corners_where_there_is_room():
     """Round the end of a wall: the field at its corner is left alone, but not where the gap is one field wide."""
     weights = np.full((30, 40), 0.5)
