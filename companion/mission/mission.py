@@ -215,13 +215,6 @@ class Mission:
     commands: tuple[DoCommand, ...] = ()
     patrol: Patrol | None = None
 
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """All files that belong to it."""
-        simulated = () if self.sitl is None else (self.sitl.world, self.sitl.parameters)
-        files = (self.source, self.prior_map, *self.also_read, *simulated)
-        return tuple(file for file in files if file is not None)
-
 
 def with_laps(mission: Mission, laps: int | None) -> Mission:
     """The mission with a patrol that ends after so many laps; None leaves it as it is. Raises MissionError."""

@@ -14,6 +14,7 @@ import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from companion.core.own_parts import OwnKind, OwnPartError, looks_own, source_of
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from companion.mission.source_files import source_files
 from companion.storage.files import read_at_most
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.policies import ERROR
@@ -88,9 +90,9 @@ class Digests:
 
     def of(self, spec: RunSpec) -> str:
         """That of a run; empty where one of its files cannot be read."""
-        key = (spec.world, spec.planner, spec.sensors, spec.faults)
+        key = (spec.world, spec.planner, spec.controller, spec.sensors, spec.faults)
         if key not in self._known:
-            digest = hashlib.sha256(code_digest().encode())
+            digest = hashlib.sha256(code_digest().encode() + _libraries().encode())
             try:
                 for file in _files(spec, self.folder):
                     digest.update(file.name.encode() + read_at_most(file, MOST_BYTES))
@@ -100,10 +102,15 @@ class Digests:
         return self._known[key]
 
 
+def _libraries() -> str:
+    """Of what the code computes with: other versions of these may give other figures."""
+    return " ".join(f"{name} {version(name)}" for name in ("numpy", "numba"))
+
+
 def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
     ground = GroundSpec.of(spec.world)
     if ground is None:
-        yield from load_mission(folder / spec.world).files
+        yield from source_files(load_mission(folder / spec.world))
     parts = [(OwnKind.PLANNER, spec.planner), (OwnKind.CONTROLLER, spec.controller)]
     parts += [] if ground is None else [(OwnKind.WORLD, ground.kind)]
     sources = [source_of(kind, name) for kind, name in parts if looks_own(kind, name)]

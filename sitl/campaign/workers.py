@@ -101,7 +101,7 @@ def _checked_on_a_worker(spec: RunSpec, digest: str, folder: Path) -> tuple[RunS
 
     if Digests(folder).of(spec) != digest:
         raise CampaignError(
-            f"the worker {get_worker().address} on {socket.gethostname()} has other code, or other files in {folder}; "
-            "install the same version there"
+            f"the worker {get_worker().address} on {socket.gethostname()} has other code, other files in {folder}, "
+            "or another numpy or numba; install the same version there"
         )
     return _checked(spec, digest, folder)

@@ -26,6 +26,7 @@ from companion.mapping.map_files import MapError
 from companion.mission.given import Given
 from companion.mission.mission import Mission, MissionError
 from companion.mission.outline_hint import outline_hint
+from companion.mission.source_files import source_files
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.safety.reasons import EndReason
@@ -108,7 +109,7 @@ def drive(
             mission = equipped(chosen, "none" if lidars and sensors is None else sensors, params)
             scenario = _simulated(mission, faults, lidars)
             files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
-            wanted.check((*files.values(), *mission.files))
+            wanted.check((*files.values(), *source_files(mission)))
             folder = context.with_resource(wanted.record_folder())
             if folder is not None:
                 with wanted.asked_for():

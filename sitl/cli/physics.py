@@ -15,6 +15,7 @@ from companion.core.clock import WallClock
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from companion.mission.source_files import source_files
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.cli.serve import BAD_INPUT, say, stop_signals
 from sitl.firmware.firmware_parameters import firmware_parameters, parameter_file
@@ -55,7 +56,7 @@ def physics(
         mission = equipped(load_mission(mission_file, skip_unknown=True), sensors, params)
         scenario = scenario_from_mission(mission)
         behind = scenario.physics(seed, linked=mavlink is not None)
-        _write_parameters(scenario, behind, write_params, (params, *mission.files))
+        _write_parameters(scenario, behind, write_params, (params, *source_files(mission)))
         link = open_link(mavlink) if mavlink else None
         # Compile everything before the firmware waits for answers.
         with Console(stderr=True).status("starting ..."):

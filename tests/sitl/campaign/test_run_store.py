@@ -77,6 +77,25 @@ def test_a_run_depends_on_its_own_files_alone(tmp_path: Path) -> None:
     assert Digests(tmp_path).of(one) == ""
 
 
+def test_a_run_depends_on_the_picture_that_its_world_is_drawn_on(tmp_path: Path) -> None:
+    (tmp_path / "base.png").write_bytes(b"before")
+    (tmp_path / "w.toml").write_text('base = "base.png"\n')
+    (tmp_path / "m.toml").write_text('[[target]]\nnorth_m = 1.0\neast_m = 2.0\n[sitl]\nworld = "w.toml"\n')
+    spec = replace(SPECS[0], world="m.toml")
+    before = Digests(tmp_path).of(spec)
+    (tmp_path / "base.png").write_bytes(b"after")
+    assert Digests(tmp_path).of(spec) not in (before, "")
+
+
+def test_a_run_depends_on_the_source_of_its_own_controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "own_part.py").write_text("class Own: ...\n")
+    monkeypatch.chdir(tmp_path)
+    own, shipped = (replace(SPECS[0], controller=name) for name in ("own_part:Own", "points"))
+    together = Digests(tmp_path)
+    assert together.of(shipped) != together.of(own), "one's digest is not the other's"
+    assert together.of(own) == Digests(tmp_path).of(own) != ""
+
+
 def test_what_ended_with_an_error_is_driven_again(tmp_path: Path) -> None:
     store = RunStore(tmp_path / "runs.jsonl", lambda spec: "d")
     store.add(SPECS[0], RunResult("", ERROR, said="MemoryError"))
