@@ -7,15 +7,17 @@ import time
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 from typer.testing import CliRunner
 
 from companion.cli import check_planner
 from companion.cli.commands import app
+from companion.control.motion_planners import motion_planner
 from companion.core.own_parts import OwnKind, OwnPartError, source_of
 from companion.mission.load import load_mission
 from companion.planning.planner import Planner
 from companion.planning.registry import UnknownPlannerError, make_planner
-from companion.settings import PlannerSettings
+from companion.settings import PlannerSettings, Settings
 from sitl.campaign.worded import GroundSpec
 from sitl.cli.commands import app as sitl
 from sitl.generators.made_ground import made as ground_of
@@ -63,6 +65,22 @@ def test_a_planner_that_breaks_the_contract_is_told_with_the_problem(
     assert again.output == told.output
 
 
+@pytest.mark.parametrize(
+    ("promise", "wrong", "shown"),
+    [
+        ("moving_obstacles", "it promises moving_obstacles, and it meets one", "a disc of radius 1.5 fields moves"),
+        ("turning_radius", "it promises turning_radius, and its line", "turning radius "),
+        ("speeds, any_angle", "", ""),
+    ],
+)
+def test_a_promise_that_is_not_kept_is_told_with_the_problem(lines: str, promise: str, wrong: str, shown: str) -> None:
+    text = Path("lines.py").read_text(encoding="utf-8")
+    promises = ", ".join(f"{one}=True" for one in promise.split(", "))
+    Path("lines.py").write_text(text.replace("Capabilities()", f"Capabilities({promises})"), encoding="utf-8")
+    told = CliRunner().invoke(app, ["check-planner", lines, "--problems", "20"])
+    assert told.exit_code == (3 if wrong else 0) and wrong in told.output and shown in told.output, told.output
+
+
 def test_a_planner_that_does_not_answer_for_long_is_told(lines: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(check_planner, "broken_by", lambda *problem: time.sleep(0.3) or "")
     monkeypatch.setattr(check_planner, "SLOW_S", 0.1)
@@ -84,18 +102,44 @@ def test_one_that_is_not_there_is_one_line(lines: str, name: str, says: str) -> 
     assert told.exit_code == 2 and says in told.output and len(told.output.splitlines()) == 1
 
 
-def test_a_package_may_register_a_name(lines: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "lines-1.0.dist-info"
-    folder.mkdir()
-    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: lines\nVersion: 1.0\n")
-    (folder / "entry_points.txt").write_text("[rover_companion.planners]\nlines = lines:Lines\n")
+def install(part: str, group: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if a package of the module's name were installed, which registers the part by that name."""
+    name = part.partition(":")[0]
+    told = folder / f"{name}-1.0.dist-info"
+    told.mkdir()
+    (told / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (told / "entry_points.txt").write_text(f"[{group}]\n{name} = {part}\n")
+    monkeypatch.syspath_prepend(str(folder))
+
+
+def test_a_package_may_register_a_planner(lines: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(UnknownPlannerError):
         make_planner("lines", PlannerSettings())
-    monkeypatch.syspath_prepend(str(tmp_path))
+    install(lines, "rover_companion.planners", tmp_path, monkeypatch)
     planner: Planner = make_planner("lines", PlannerSettings())
     assert planner.name == "lines"
     with pytest.raises(UnknownPlannerError, match=r"did you mean 'lines'"):
         make_planner("liness", PlannerSettings())
+
+
+def test_a_package_may_register_a_controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    dice = written("planners.md", "Dice", tmp_path, monkeypatch)
+    with pytest.raises(ValidationError, match="unknown controller 'dice'"):
+        Settings.model_validate({"guidance": {"controller": "dice"}})
+    install(dice, "rover_companion.controllers", tmp_path, monkeypatch)
+    assert Settings.model_validate({"guidance": {"controller": "dice"}}).guidance.controller == "dice"
+    assert type(motion_planner("dice", 1)).__name__ == "Dice"
+
+
+def test_a_package_may_register_a_world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    orchard = written("worlds.md", "Orchard", tmp_path, monkeypatch)
+    make = ["world", "make", "orchard", "--out", "worlds", "--set", "row_m=3"]
+    told = CliRunner().invoke(sitl, make)
+    assert told.exit_code == 2 and "orchard" in told.output
+    install(orchard, "rover_companion.worlds", tmp_path, monkeypatch)
+    made = CliRunner().invoke(sitl, make)
+    assert made.exit_code == 0, made.output
+    assert GroundSpec.of("orchard row_m=3") is not None
 
 
 @pytest.mark.thorough
