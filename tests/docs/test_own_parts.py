@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
+from typer import Typer
 from typer.testing import CliRunner
 
 from companion.cli import check_planner
@@ -51,6 +53,27 @@ def test_the_planner_of_the_page_keeps_the_contract_and_finds_a_way(lines: str) 
     planned = CliRunner().invoke(app, ["plan", *where, "--planner", lines])
     assert planned.exit_code == 0 and "lines" in planned.output, planned.output
     assert sys.path == before and source_of(OwnKind.PLANNER, lines) == Path("lines.py").resolve()
+
+
+def test_the_planner_of_the_page_drives(lines: str, tmp_path: Path) -> None:
+    mission = str(MAPS.parent / "first-drive" / "five-metres.toml")
+    driven = CliRunner().invoke(sitl, ["drive", mission, "--planner", lines, "--json", "drive.json", "--record", "rec"])
+    assert driven.exit_code == 0, driven.output
+    assert json.loads(Path("drive.json").read_text())["settings"]["navigator"]["planner"] == lines
+    replayed = CliRunner().invoke(app, ["replay", "rec"])
+    assert replayed.exit_code == 0 and "differences: none" in replayed.output, replayed.output
+
+
+@pytest.mark.parametrize(
+    "command", [(sitl, "drive", []), (app, "run", ["--connect", "udpin:127.0.0.1:0", "--state", "state"])]
+)
+def test_a_planner_that_is_not_there_is_refused_as_an_option(
+    command: tuple[Typer, str, list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    program, name, options = command
+    told = CliRunner().invoke(program, [name, str(MAPS.parent / "open.toml"), "--planner", "astr", *options])
+    assert told.exit_code == 2 and told.output.startswith("--planner: unknown planner 'astr', did you mean 'astar'?")
 
 
 def test_a_planner_that_breaks_the_contract_is_told_with_the_problem(
