@@ -16,14 +16,14 @@ def plan(first: int) -> Plan:
     return Plan(np.array([[0, 0], [3, 4]]), np.array([0.5]), 10.0, first, 1000, 1000)
 
 
-def trip(online: int, offline: int) -> Trip:
-    return Trip(plan(offline), plan(online), 2.0, 30.0, 20.0, 3.0, 1.0)
+def trip(online: int, offline: int, offline_first_ms: float = 3.0) -> Trip:
+    return Trip(plan(offline), plan(online), 2.0, 30.0, 20.0, offline_first_ms, 1.0)
 
 
 def test_rows_in_which_on_line_planning_needs_less_are_counted() -> None:
-    entries = (Entry(TIME, 1, (trip(10, 20),)), Entry(TIME, 2, (trip(30, 20),)))
+    entries = (Entry(TIME, 1, (trip(10, 20),)), Entry(TIME, 2, (trip(30, 20, offline_first_ms=1.0),)))
     assert _quicker(entries) == (
-        "generations until the first feasible path in 1, time until then in 2, and time for 1000 generations in 0 of "
+        "generations until the first feasible path in 1, time until then in 1, and time for 1000 generations in 0 of "
         "the 2 rows"
     )
     assert _detail(entries[0])[5:8] == ["20", "3 ms", "20 ms"]
