@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Annotated
 
@@ -10,7 +11,9 @@ import typer
 
 from companion.cli.inputs import EXIT_BAD_INPUT
 from companion.cli.patience import Patience
-from companion.planning.planner_contract import broken_by, random_problem
+from companion.planning.contract_problems import tasks_for
+from companion.planning.planner import Planner
+from companion.planning.planner_contract import broken_by
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings
@@ -18,42 +21,49 @@ from companion.settings import PlannerSettings
 EXIT_BROKEN = 3
 SLOW_S = 10.0
 """After so long without an answer to one problem it is told."""
-BUDGET = Budget(min_epochs=2, max_epochs=15, control_points=(4, 6), population=18)
 SIGNS = {True: "#", False: "."}
 
 
 def check_planner(
     name: Annotated[str, typer.Argument(metavar="NAME", help="A planner: its name, or module:name.")],
-    problems: Annotated[int, typer.Option(min=1, help="So many random problems.")] = 300,
+    problems: Annotated[
+        int, typer.Option(min=1, help="So many random ones; as many again for each promise that needs its own.")
+    ] = 300,
     seed: Annotated[int, typer.Option(min=0, help="Of the first problem; the next ones are consecutive.")] = 0,
 ) -> None:
-    """Hold a planner to the contract of all planners, on random problems.
+    """Hold a planner to the contract of all planners and to what its capabilities promise, on random problems.
 
-    Exit code 0: it keeps the contract; 3: it breaks it, and the first problem is shown; 2: no such planner.
+    Exit code 0: it keeps both; 3: it breaks one, and the first problem is shown; 2: no such planner.
     """
     try:
         planner = make_planner(name, PlannerSettings())
     except UnknownPlannerError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    found = 0
+    asked = found = 0
     for number in range(seed, seed + problems):
-        problem = random_problem(np.random.default_rng(number))
-        patience = Patience(SLOW_S, partial(_tell, f"{name}: problem {number}: no answer for {SLOW_S:.0f} s yet"))
-        patience.begin()
-        try:
-            wrong = broken_by(planner, problem, BUDGET, number)
-            found += not wrong and planner.plan(problem, BUDGET, np.random.default_rng(number)).path is not None
-        except Exception as error:
-            wrong = " ".join(f"it raised {type(error).__name__}: {error}".split())
-        finally:
-            patience.end()
-        if wrong:
-            typer.echo(f"{name}: problem {number}: {wrong}", err=True)
-            typer.echo(picture(problem), err=True)
-            typer.echo(f"again: rover-companion check-planner {name} --problems 1 --seed {number}", err=True)
-            raise typer.Exit(EXIT_BROKEN)
-    typer.echo(f"{name}: keeps the contract on {problems} problems; it found a path in {found} of them")
+        for problem, budget in tasks_for(planner.capabilities, number):
+            wrong, has_path = _judged(name, planner, problem, budget, number)
+            asked, found = asked + 1, found + has_path
+            if wrong:
+                typer.echo(f"{name}: problem {number}: {wrong}", err=True)
+                typer.echo(picture(problem), err=True)
+                typer.echo(f"again: rover-companion check-planner {name} --problems 1 --seed {number}", err=True)
+                raise typer.Exit(EXIT_BROKEN)
+    typer.echo(f"{name}: keeps the contract on {asked} problems; it found a path in {found} of them")
+
+
+def _judged(name: str, planner: Planner, problem: PlanningProblem, budget: Budget, number: int) -> tuple[str, bool]:
+    """What it does wrong on a problem, and whether it finds a path."""
+    patience = Patience(SLOW_S, partial(_tell, f"{name}: problem {number}: no answer for {SLOW_S:.0f} s yet"))
+    patience.begin()
+    try:
+        wrong = broken_by(planner, problem, budget, number)
+        return wrong, not wrong and planner.plan(problem, budget, np.random.default_rng(number)).path is not None
+    except Exception as error:
+        return " ".join(f"it raised {type(error).__name__}: {error}".split()), False
+    finally:
+        patience.end()
 
 
 def _tell(text: str) -> None:
@@ -66,5 +76,11 @@ def picture(problem: PlanningProblem) -> str:
     for sign, (x, y) in (("S", problem.start), ("T", problem.target)):
         if 0 <= y < len(rows) and 0 <= x < len(rows[0]):
             rows[y][x] = sign
-    corner = "corners may be cut" if problem.corner_cutting else "no corner may be cut"
-    return "\n".join(["".join(row) for row in reversed(rows)] + [corner])
+    told = ["corners may be cut" if problem.corner_cutting else "no corner may be cut"]
+    for mover in problem.moving_obstacles:
+        places = ", ".join(f"at {x:.1f}, {y:.1f} after {time_s:.1f} s" for time_s, x, y in mover.track)
+        told.append(f"a disc of radius {mover.radius_fields:g} fields moves: {places}")
+    heading_rad, radius = problem.kinematics.heading_rad, problem.kinematics.turning_radius_fields
+    if heading_rad is not None and radius > 0.0:
+        told.append(f"turning radius {radius:.3g} fields, heading {math.degrees(heading_rad):.0f} deg from right to up")
+    return "\n".join(["".join(row) for row in reversed(rows)] + told)

@@ -12,7 +12,7 @@ import typer
 
 from companion.core.own_parts import OwnPartError
 from companion.executive.controller_choice import check_controller
-from companion.planning.registry import UnknownPlannerError, make_planner
+from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner
 from companion.settings import Settings, SettingsError, load_settings
 from companion.storage.files import beside, refuse_pipe, whole_file
 
@@ -31,6 +31,12 @@ Laps = Annotated[
 ]
 
 
+PlannerName = Annotated[
+    str | None,
+    typer.Option("--planner", help=f"{', '.join(PLANNERS)}, or one's own as module:name; default: the settings'."),
+]
+
+
 EXIT_NOT_WRITTEN = 5
 """The command has done its work, and could not write a file about it."""
 
@@ -39,13 +45,20 @@ class OutputError(Exception):
     """A file that cannot be written; the text is one line with file, reason and remedy."""
 
 
-def usable_settings(path: Path | None) -> Settings:
-    """The settings of a file (None: the defaults), with a planner and a controller that exist. Raises SettingsError."""
+def usable_settings(path: Path | None, planner: str | None = None) -> Settings:
+    """The settings of a file (None: the defaults), with a planner and a controller that exist.
+
+    ``planner`` is used instead of theirs. Raises SettingsError.
+    """
     settings = load_settings(path)
+    if planner is not None:
+        navigator = settings.navigator.model_copy(update={"planner": planner})
+        settings = settings.model_copy(update={"navigator": navigator})
     try:
         make_planner(settings.navigator.planner, settings.planner)
     except UnknownPlannerError as error:
-        raise SettingsError(f"{path}: navigator.planner: {error}") from error
+        place = f"{path}: navigator.planner" if planner is None else "--planner"
+        raise SettingsError(f"{place}: {error}") from error
     try:
         check_controller(settings.guidance.controller)
     except OwnPartError as error:

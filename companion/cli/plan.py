@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from companion.cli.bends import tightest_radius, too_tight
 from companion.cli.images import save_plan
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, picture, usable_settings
 from companion.core.clock import stopwatch_s
@@ -23,6 +22,7 @@ from companion.core.grid import Cell, Grid, inflated
 from companion.core.own_parts import OwnKind, OwnPartError, blamed
 from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
+from companion.planning.line_to_drive import AHEAD_DEG, bearing_of, line_of, tightest_radius, too_tight
 from companion.planning.problem import KinematicConstraints, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.problem import Path as GridPath
 from companion.planning.raster import FAULTS, PathFault, cells_cost, first_fault, plain
@@ -41,9 +41,6 @@ EFFORT = {
     "prm": ("queries of the roadmap", "lines looked at"),
 }
 """What a planner's epochs and evaluations count, if not those of the paper's genetic algorithm."""
-
-AHEAD_DEG = 10.0
-"""A line that starts this near to the rover's heading can be driven: its first step is a chord of an arc."""
 
 STATUS_WORDS = {
     PlanStatus.FOUND: "found",
@@ -84,23 +81,9 @@ def flipped(cell: Cell, height: int, top_left: bool) -> tuple[int, int]:
     return (cell.x, height - 1 - cell.y) if top_left else (cell.x, cell.y)
 
 
-def line_of(path: GridPath) -> NDArray[np.float64]:
-    """The line to drive: the path's curve, or else the line through the middles of its fields.
-
-    Shape (n, 2), in fields.
-    """
-    return path.cell_array.astype(np.float64) if path.curve is None else path.curve
-
-
 def length_of(line: NDArray[np.float64]) -> float:
     """The length of a line, in its own unit."""
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
-
-
-def bearing_of(line: NDArray[np.float64]) -> float:
-    """The direction in which a line starts: 0 along +x, growing towards +y."""
-    x, y = next(step for step in line - line[0] if step.any())
-    return math.atan2(y, x)
 
 
 def as_text(answer: Answer) -> str:

@@ -18,7 +18,7 @@ from companion.cli.arming_advice import ArmingAdvice
 from companion.cli.ending import ended, print_statuses
 from companion.cli.entry import EXIT_STOPPED
 from companion.cli.given import RadiusM, ResolutionM, SpeedMS
-from companion.cli.inputs import EXIT_BAD_INPUT, Laps, OutputError, SkipUnknown, usable_settings
+from companion.cli.inputs import EXIT_BAD_INPUT, Laps, OutputError, PlannerName, SkipUnknown, usable_settings
 from companion.cli.lidars import LidarOption, lidars_given
 from companion.cli.live import STDERR, Live, Reader, error_console, levelled, reader_of
 from companion.cli.live_view import LiveView, View, painter_for
@@ -84,6 +84,7 @@ def run(
     speed_m_s: SpeedMS = None,
     arm: Annotated[bool, typer.Option("--arm", help="Arm the motors; otherwise wait for a person to do it.")] = False,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
+    planner: PlannerName = None,
     seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
     record: Annotated[Path | None, typer.Option(help="Directory for the record and the map of this run.")] = None,
     state: Annotated[Path | None, typer.Option(help="Directory where this rover's state is kept.")] = None,
@@ -124,7 +125,10 @@ def run(
             budget = ShutdownBudget()
             files = StateFiles(state, budget)
             ends.callback(files.close)
-            settings, specs = files.settings(usable_settings(settings_file), say), lidars_given(lidar, connect)
+            settings, specs = (
+                files.settings(usable_settings(settings_file, planner), say),
+                lidars_given(lidar, connect),
+            )
             signer = files.signer(signing_key)
             painter = painter_for(view=view, say=say)
             page = web_viewer(web, web_token, warn, actions=web_actions, signer=signer)

@@ -1,4 +1,4 @@
-"""What every planner must keep (``Planner.plan``), checked on one problem; and random problems to check it on.
+"""What every planner must keep (``Planner.plan``) and what its own capabilities promise, checked on one problem.
 
 Nouns: planner contract.
 """
@@ -11,15 +11,23 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.core.grid import Cell
-from companion.planning.planner import Planner
+from companion.planning.graph_search.dijkstra import Dijkstra
+from companion.planning.line_to_drive import AHEAD_DEG, bearing_of, line_of, too_tight
+from companion.planning.planner import Capabilities, Planner
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanStatus, path_cost
-from companion.planning.raster import FAULTS, PathFault, first_fault, plain
+from companion.planning.raster import FAULTS, PathFault, first_fault, plain, polyline
+from companion.settings import PlannerSettings
 
 Curve = NDArray[np.float64]
-MOST_SIDE = 14
 NEAR_ENOUGH = 1e-6
-"""Fields; of the ends of a smooth curve."""
+"""Fields, of the ends of a curve; fields/s, of a speed."""
+MOST_ASIDE_FIELDS = 2.0
+"""A smooth curve may leave its path by so much, on problems as small as those of ``contract_problems``. The curve of
+Kwasniewski & Gosiewski passes beside the straight lines whose fields are checked, and may graze an obstacle there."""
+STEP_FIELDS = 0.1
+STEP_S = 0.02
+SLACK_FIELDS = 0.05
+"""A meeting that is no deeper is one of rounding."""
 
 
 def broken_by(planner: Planner, problem: PlanningProblem, budget: Budget, seed: int) -> str:
@@ -65,15 +73,91 @@ def _fault_of(path: Path, problem: PlanningProblem, planner: Planner) -> str:
     cost = path_cost(problem.weights, cells)
     if not math.isclose(path.cost, cost, rel_tol=1e-9, abs_tol=1e-12):
         return f"its path costs {cost:.6g}, it says {path.cost:.6g}"
-    if path.curve is None:
+    promised = planner.capabilities
+    wrong = _fault_of_curve(path, problem, promised) or _fault_of_speeds(path, problem, promised)
+    return wrong or _broken_promise(path, problem, promised)
+
+
+def _fault_of_curve(path: Path, problem: PlanningProblem, promised: Capabilities) -> str:
+    curve = path.curve
+    if curve is None:
         return ""
-    if not (planner.capabilities.smooth_curve or planner.capabilities.any_angle):
+    if not (promised.smooth_curve or promised.any_angle):
         return "it gives a curve, and its capabilities say neither smooth_curve nor any_angle"
-    if path.curve.ndim != 2 or path.curve.shape[1] != 2 or not np.isfinite(path.curve).all():
+    if curve.ndim != 2 or curve.shape[1] != 2 or not np.isfinite(curve).all():
         return "its curve is no array of finite places, shape (n, 2)"
     ends = np.array((problem.start, problem.target), dtype=np.float64)
-    if np.abs(path.curve[[0, -1]] - ends).max() > NEAR_ENOUGH:
+    if len(curve) == 0 or np.abs(curve[[0, -1]] - ends).max() > NEAR_ENOUGH:
         return "its curve does not begin at the start and end at the target"
+    if promised.smooth_curve:
+        aside = np.abs(_walked(curve)[:, None] - path.cell_array).max(axis=2).min(axis=1)
+        far = f"its curve leads {aside.max():.1f} fields away from its path, {MOST_ASIDE_FIELDS:g} is the most"
+        return far if aside.max() > MOST_ASIDE_FIELDS else ""
+    corners = np.floor(curve + 0.5).astype(np.int64)
+    number, index = first_fault(plain(problem.weights), polyline(corners), problem.corner_cutting)
+    fault = f"its curve is the line to drive, and has a fault: {FAULTS[number]}, at field {index} under it"
+    return "" if FAULTS[number] is PathFault.NONE else fault
+
+
+def _fault_of_speeds(path: Path, problem: PlanningProblem, promised: Capabilities) -> str:
+    speeds, curve = path.speeds_fields_s, path.curve
+    if speeds is None:
+        return "it gives a curve without speeds, and promises speeds" if promised.speeds and curve is not None else ""
+    if not promised.speeds:
+        return "it gives speeds, and its capabilities do not say so"
+    low, high = problem.kinematics.speeds_fields_s
+    if curve is None or speeds.shape != (len(curve) - 1,):
+        return "its speeds are not one from each point of its curve to the next"
+    within = bool(((speeds >= low - NEAR_ENOUGH) & (speeds <= high + NEAR_ENOUGH)).all())
+    return "" if within else f"it gives a speed outside {low:g} to {high:g} fields/s"
+
+
+def _broken_promise(path: Path, problem: PlanningProblem, promised: Capabilities) -> str:
+    kinematics = problem.kinematics
+    if promised.optimal:
+        cheapest = Dijkstra(PlannerSettings()).plan(problem, Budget(), np.random.default_rng(0)).path
+        if cheapest is not None and path.cost > cheapest.cost * (1.0 + 1e-9) + 1e-12:
+            return f"it promises optimal, and its path costs {path.cost:.6g} where {cheapest.cost:.6g} is enough"
+    if len(path.cell_array) < 2:
+        return ""
+    line, radius = line_of(path), kinematics.turning_radius_fields
+    if promised.moving_obstacles and (met := _meeting(line, path.speeds_fields_s, problem)):
+        return f"it promises moving_obstacles, and {met}"
+    if promised.turning_radius and radius > 0.0:
+        if tight := len(too_tight(line, radius)):
+            bends = f"{tight} bend{'s' * (tight > 1)} tighter than the radius, {radius:.3g} fields"
+            return f"it promises turning_radius, and its line has {bends}"
+        off_rad = 0.0 if kinematics.heading_rad is None else bearing_of(line) - kinematics.heading_rad
+        off_deg = math.degrees(abs(math.remainder(off_rad, 2.0 * math.pi)))
+        if off_deg > AHEAD_DEG:
+            return f"it promises turning_radius, and its line sets out {off_deg:.0f} deg off the heading"
+    return ""
+
+
+def _walked(line: Curve) -> Curve:
+    """Places along a line, at most STEP_FIELDS apart."""
+    steps = np.ceil(np.hypot(*np.diff(line, axis=0).T) / STEP_FIELDS).astype(np.int64)
+    at = np.concatenate([[0.0], *(i + np.arange(1, count + 1) / count for i, count in enumerate(steps) if count)])
+    return np.column_stack([np.interp(at, np.arange(len(line)), line[:, axis]) for axis in (0, 1)])
+
+
+def _meeting(line: Curve, speeds_fields_s: NDArray[np.float64] | None, problem: PlanningProblem) -> str:
+    """Where the rover first meets a moving obstacle, in words; empty if it meets none.
+
+    Without speeds of the planner it drives as fast as it may.
+    """
+    lengths = np.hypot(*np.diff(line, axis=0).T)
+    speeds = problem.kinematics.speeds_fields_s[1] if speeds_fields_s is None else speeds_fields_s
+    passed_s = np.concatenate(([0.0], np.cumsum(lengths / speeds)))
+    times_s = np.arange(0.0, passed_s[-1], STEP_S)
+    rover = np.column_stack([np.interp(times_s, passed_s, line[:, axis]) for axis in (0, 1)])
+    for mover in problem.moving_obstacles:
+        track = mover.track
+        there = np.column_stack([np.interp(times_s, track[:, 0], track[:, axis]) for axis in (1, 2)])
+        near = np.flatnonzero(np.hypot(*(rover - there).T) < mover.radius_fields - SLACK_FIELDS)
+        if len(near):
+            x, y = rover[near[0]]
+            return f"it meets one {times_s[near[0]]:.1f} s after the start, at {x:.1f}, {y:.1f}"
     return ""
 
 
@@ -94,19 +178,3 @@ def reachable(problem: PlanningProblem) -> bool:
                 seen.add(place)
                 edge.append(place)
     return tuple(problem.target) in seen
-
-
-def random_problem(rng: np.random.Generator) -> PlanningProblem:
-    """A small one, mostly with a way and many corners: most faults show only where a path is found beside obstacles."""
-    width, height = (int(side) for side in rng.integers(1, MOST_SIDE + 1, 2))
-    ground = rng.integers(3)
-    weights = rng.random((height, width)) if ground == 0 else np.full((height, width), 0.5 * (ground - 1))
-    weights[rng.random((height, width)) < rng.choice([0.25, 0.1, 0.4, 0.0])] = 1.0
-    if rng.random() < 0.2:  # ends anywhere: on obstacles, outside the map
-        start, target = (Cell(int(rng.integers(-1, width + 1)), int(rng.integers(-1, height + 1))) for _ in range(2))
-    else:  # free and usually far apart
-        low, high = sorted(rng.integers(0, width, 2))
-        start, target = Cell(int(low), int(rng.integers(height))), Cell(int(high), int(rng.integers(height)))
-        weights[start.y, start.x] = weights[target.y, target.x] = 0.5
-    weights.flags.writeable = bool(rng.random() < 0.5)
-    return PlanningProblem(weights, start, target, bool(rng.random() < 0.5))

@@ -13,7 +13,15 @@ from rich.console import Console
 from companion.app import Status
 from companion.cli.entry import StoppedError
 from companion.cli.given import RadiusM, SpeedMS
-from companion.cli.inputs import EXIT_BAD_INPUT, EXIT_NOT_WRITTEN, Laps, OutputError, SkipUnknown, usable_settings
+from companion.cli.inputs import (
+    EXIT_BAD_INPUT,
+    EXIT_NOT_WRITTEN,
+    Laps,
+    OutputError,
+    PlannerName,
+    SkipUnknown,
+    usable_settings,
+)
 from companion.cli.mission import warn_of_world
 from companion.cli.source import warn_of_places, warning
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
@@ -59,6 +67,7 @@ def drive(
     mission_file: options.MissionFile = None,
     seed: options.Seed = 0,
     settings_file: options.SettingsFile = None,
+    planner: PlannerName = None,
     record: options.Record = None,
     report_file: options.ReportFile = None,
     image: options.Image = None,
@@ -101,7 +110,7 @@ def drive(
     try:
         painter, page = _painter(view), web_viewer(web, web_token, _warn, actions=web_actions)
         with _telling(page):
-            settings = usable_settings(settings_file)
+            settings = usable_settings(settings_file, planner)
             where = OnWorld(world, start, target, resolution_m, top_left, prior)
             given = Given(resolution_m if world is None else None, radius_m, speed_m_s)
             chosen = mission_to_drive(mission_file, where, given, skip_unknown=skip_unknown, laps=laps)

@@ -1,4 +1,4 @@
-"""Moving obstacles: planning with their motion against making way only, choosing speeds against one speed.
+"""Moving obstacles: planning with their motion against yielding only, choosing speeds against one speed.
 
 The claim of Wang et al. 2007, with a rover that drives: contacts and times over the same ground with the same seeds.
 """
@@ -23,7 +23,7 @@ from sitl.experiments.controllers import mission_on, scenario_on
 from sitl.experiments.experiment import Advance, ExperimentReport, Options, each, shipped_missions
 from sitl.experiments.intervals import mean_with_interval, ratio_with_interval
 from sitl.experiments.off_model import parameters_for
-from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
+from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table, without_intervals
 from sitl.generators.kinds import GroundKind
 from sitl.generators.made_ground import made
 from sitl.lockstep import Drive
@@ -33,17 +33,20 @@ NAME = "traffic"
 MISSIONS = ("crossing.toml", "depot.toml")
 MADE, MOVERS = "made clutter", 4
 TIME_LIMIT_S = 900.0
-HEAD = ("way", "runs", "touched", "run into", "refused", "missed", "mean s", "/ make way")
-SHORT = ("way", "runs", "touched", "run into", "refused", "missed", "s", "/ first")
+HEAD = ("way", "runs", "contacts", "touched in", "run into", "refused", "missed", "mean s")
+PAIR_HEAD = ("first / second", "touched: first only", "second only", "pairs", "ratio of times")
+SHORT_PAIR_HEAD = ("first / second", "touched: 1st", "2nd only", "pairs", "times")
 
 
 class Way(StrEnum):
     """What is done about things that move."""
 
-    MAKE_WAY = "make way"
-    """The planner knows nothing of them; the rover stops, or moves aside, before what comes across."""
+    HYBRID = "hybrid"
+    """As the program comes: the planner knows nothing of them; the rover yields to what comes across."""
+    YIELD = "yield only"
+    """The same with ``vertex``: what ``vertex++`` is without moving obstacles and with one speed."""
     ONE_SPEED = "plan, one speed"
-    """Paths past where they will be, at cruise speed; and it makes way."""
+    """``vertex++``: paths past where they will be, at cruise speed; and it yields."""
     SPEEDS = "plan, speeds"
     """The same, with a speed for each piece of the path."""
     MOTIONS = "motions"
@@ -51,11 +54,19 @@ class Way(StrEnum):
 
 
 SETTINGS: dict[Way, dict[str, object]] = {
-    Way.MAKE_WAY: {},
+    Way.HYBRID: {},
+    Way.YIELD: {"navigator": {"planner": "vertex"}},
     Way.ONE_SPEED: {"navigator": {"planner": "vertex++"}, "planner": {"vertex": {"speed_levels": 1}}},
     Way.SPEEDS: {"navigator": {"planner": "vertex++"}},
     Way.MOTIONS: {"guidance": {"controller": "motion-ga"}},
 }
+PAIRS = (
+    (Way.ONE_SPEED, Way.YIELD),
+    (Way.SPEEDS, Way.ONE_SPEED),
+    (Way.SPEEDS, Way.YIELD),
+    (Way.MOTIONS, Way.HYBRID),
+)
+"""What differs in one thing only: planning with motion, choosing speeds, both, and another controller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,9 +122,11 @@ class TrafficReport(ExperimentReport):
     drives: tuple[TrafficDrive, ...]
 
     def tables(self) -> list[Table]:
-        """One for each course, a row a way."""
+        """Two for each course: a row a way, and a row a pair of ways."""
         return [
-            terminal_table(f"{NAME}: {name}", SHORT, without_intervals(self._rows(name))) for name in self._courses()
+            terminal_table(f"{NAME}: {name}", head, without_intervals(rows))
+            for name in self._courses()
+            for head, rows in ((HEAD, self._rows(name)), (SHORT_PAIR_HEAD, self._pairs(name)))
         ]
 
     def as_json(self) -> dict[str, object]:
@@ -124,38 +137,80 @@ class TrafficReport(ExperimentReport):
     def _courses(self) -> list[str]:
         return list(dict.fromkeys(one.course for one in self.drives))
 
+    def _of(self, course: str, way: Way) -> list[TrafficDrive]:
+        return [one for one in self.drives if (one.course, one.way) == (course, way)]
+
     def _rows(self, course: str) -> list[list[str]]:
-        of_way = {way: [one for one in self.drives if (one.course, one.way) == (course, way)] for way in Way}
-        return [_row(own, of_way[Way.MAKE_WAY]) for own in of_way.values()]
+        return [_row(self._of(course, way)) for way in Way]
+
+    def _pairs(self, course: str) -> list[list[str]]:
+        return [
+            [f"{one} / {other}", *_compared(self._of(course, one), self._of(course, other))] for one, other in PAIRS
+        ]
 
     def section(self) -> str:
         """See ``ExperimentReport``."""
-        tables = "\n\n".join(f"{name}:\n\n{markdown_table(HEAD, self._rows(name))}" for name in self._courses())
+        tables = "\n\n".join(
+            f"{name}:\n\n{markdown_table(HEAD, self._rows(name))}\n\n{markdown_table(PAIR_HEAD, self._pairs(name))}"
+            for name in self._courses()
+        )
         return f"""## Among things that move
 
 `{self.options.command(NAME)}`
 
-The claim of Wang et al. (2007) with a rover that drives: {self.options.runs} seeds of each course in lock-step, the
+Wang et al. (2007) claim that a robot gets past moving obstacles sooner and more safely if it plans with their motion,
+and chooses its speeds. Here a rover drives by such plans: each course with {self.options.runs} seeds in lock-step, the
 same for all ways. `crossing` and `depot` as shipped; *{MADE}*: another ground for each seed, with {MOVERS} discs that
-drive to and fro across the way and announce nothing. *{Way.MAKE_WAY}*: the planner `hybrid` knows nothing of what
-moves, and the rover stops or moves aside before it; *{Way.ONE_SPEED}*: `vertex++` plans paths past where things will
-be, at cruise speed; *{Way.SPEEDS}*: with a speed for each piece of the path; *{Way.MOTIONS}*: `motion-ga` plans motions
-among them, with the guard on the autopilot. All of them make way, too. *touched*: contacts while the rover moved; *run
-into*: it stood, and something came along (nothing here gives way to a rover); *missed*: targets not reached; *mean s*:
-driving time where none was, and */ {Way.MAKE_WAY}* that over the first way's, of the seeds with which both missed none;
-in brackets 95 % intervals by resampling seeds.
+drive to and fro across the way and announce nothing. Nothing gives way to the rover.
+
+The ways, all of which yield: the rover stops or moves aside before what comes across.
+
+- *{Way.YIELD}*: the planner `vertex`. It is `vertex++` that knows nothing of motion and has one speed: without moving
+  obstacles both give the same paths. What moves is an obstacle on its map while it is seen, where it is seen.
+- *{Way.ONE_SPEED}*: `vertex++` plans paths past where things will be, at cruise speed.
+- *{Way.SPEEDS}*: `vertex++` with a speed for each piece of the path.
+- *{Way.HYBRID}*: the planner that the program has without settings, which knows nothing of motion either.
+- *{Way.MOTIONS}*: `motion-ga` plans motions among them, the planner is `hybrid`, with the guard on the autopilot.
+
+*contacts*: while the rover moved; *touched in*: the share of the runs with such a contact; *run into*: it stood, and
+something came along; *refused*: setpoints that the last look replaced; *missed*: targets not reached; *mean s*: driving
+time where none was.
+
+Below it, ways that differ in one thing, or in two, over the same seeds. *{Way.ONE_SPEED} / {Way.YIELD}* is what
+planning with motion brings, *{Way.SPEEDS} / {Way.ONE_SPEED}* what choosing speeds brings, *{Way.SPEEDS} / {Way.YIELD}*
+what both bring. *touched*: seeds with a contact in one way and none in the other. *ratio of times*: mean driving time
+of the first way over the second's, of the *pairs*, seeds with which both missed no target; below 1 the first is
+quicker. In brackets are 95 % intervals: of shares after Clopper and Pearson, of times by resampling seeds. A ratio
+whose interval contains 1 shows no difference.
 
 {tables}
 """
 
 
-def _row(own: Sequence[TrafficDrive], reference: Sequence[TrafficDrive]) -> list[str]:
-    counts = [sum(getattr(one, name) for one in own) for name in ("touched", "run_into", "refused", "missed")]
-    arrived = [(one, other) for one, other in zip(own, reference, strict=True) if not one.missed + other.missed]
-    pairs = np.array([(one.seconds, other.seconds) for one, other in arrived], float).reshape(-1, 2)
+def _row(own: Sequence[TrafficDrive]) -> list[str]:
+    contacts, *others = (
+        sum(getattr(one, name) for one in own) for name in ("touched", "run_into", "refused", "missed")
+    )
+    touched_in = share_with_interval(sum(one.touched > 0 for one in own), len(own))
     times_s = [one.seconds for one in own if not one.missed]
-    ratio = "1" if own is reference else ratio_with_interval(pairs)
-    return [own[0].way, f"{len(own)}", *map(str, counts), mean_with_interval(times_s, digits=1), ratio]
+    return [
+        own[0].way,
+        f"{len(own)}",
+        f"{contacts}",
+        touched_in,
+        *map(str, others),
+        mean_with_interval(times_s, digits=1),
+    ]
+
+
+def _compared(first: Sequence[TrafficDrive], second: Sequence[TrafficDrive]) -> list[str]:
+    """Seeds with a contact in one way only, pairs in which both missed no target, and the ratio of their times."""
+    both = list(zip(first, second, strict=True))
+    only_first = sum(one.touched > 0 and other.touched == 0 for one, other in both)
+    only_second = sum(other.touched > 0 and one.touched == 0 for one, other in both)
+    times_s = [(one.seconds, other.seconds) for one, other in both if not one.missed + other.missed]
+    ratio = ratio_with_interval(np.array(times_s, float).reshape(-1, 2))
+    return [f"{only_first}", f"{only_second}", f"{len(times_s)}", ratio]
 
 
 def run(options: Options, advance: Advance) -> TrafficReport:

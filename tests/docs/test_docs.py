@@ -9,6 +9,7 @@ import re
 import runpy
 import shutil
 import subprocess
+import sys
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -86,7 +87,7 @@ def test_the_mission_in_the_readme_is_driven_as_shown(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("where", "text"), blocks("toml"))
-def test_toml_examples_are_understood(where: str, text: str, tmp_path: Path) -> None:
+def test_toml_examples_are_understood(where: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if text.startswith("# settings"):
         assert parse_settings(tomllib.loads(text), where).profile
         return
@@ -97,6 +98,10 @@ def test_toml_examples_are_understood(where: str, text: str, tmp_path: Path) -> 
     if text.startswith("# campaign"):
         shutil.copy(ROOT / "missions" / "dead-end.toml", tmp_path)
         (tmp_path / "campaigns").mkdir()
+        (planner,) = (code for _, code in blocks("python") if "class Dogleg" in code)
+        (tmp_path / "dogleg.py").write_text(planner, encoding="utf-8")
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.delitem(sys.modules, "dogleg", raising=False)
         (tmp_path / "campaigns" / "c.toml").write_text(text, encoding="utf-8")
         assert run_count(load_campaign(tmp_path / "campaigns" / "c.toml")) > 1
         return

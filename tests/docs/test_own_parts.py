@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
+from typer import Typer
 from typer.testing import CliRunner
 
 from companion.cli import check_planner
 from companion.cli.commands import app
+from companion.control.motion_planners import motion_planner
 from companion.core.own_parts import OwnKind, OwnPartError, source_of
 from companion.mission.load import load_mission
 from companion.planning.planner import Planner
 from companion.planning.registry import UnknownPlannerError, make_planner
-from companion.settings import PlannerSettings
+from companion.settings import PlannerSettings, Settings
 from sitl.campaign.worded import GroundSpec
 from sitl.cli.commands import app as sitl
 from sitl.generators.made_ground import made as ground_of
@@ -51,6 +55,27 @@ def test_the_planner_of_the_page_keeps_the_contract_and_finds_a_way(lines: str) 
     assert sys.path == before and source_of(OwnKind.PLANNER, lines) == Path("lines.py").resolve()
 
 
+def test_the_planner_of_the_page_drives(lines: str, tmp_path: Path) -> None:
+    mission = str(MAPS.parent / "first-drive" / "five-metres.toml")
+    driven = CliRunner().invoke(sitl, ["drive", mission, "--planner", lines, "--json", "drive.json", "--record", "rec"])
+    assert driven.exit_code == 0, driven.output
+    assert json.loads(Path("drive.json").read_text())["settings"]["navigator"]["planner"] == lines
+    replayed = CliRunner().invoke(app, ["replay", "rec"])
+    assert replayed.exit_code == 0 and "differences: none" in replayed.output, replayed.output
+
+
+@pytest.mark.parametrize(
+    "command", [(sitl, "drive", []), (app, "run", ["--connect", "udpin:127.0.0.1:0", "--state", "state"])]
+)
+def test_a_planner_that_is_not_there_is_refused_as_an_option(
+    command: tuple[Typer, str, list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    program, name, options = command
+    told = CliRunner().invoke(program, [name, str(MAPS.parent / "open.toml"), "--planner", "astr", *options])
+    assert told.exit_code == 2 and told.output.startswith("--planner: unknown planner 'astr', did you mean 'astar'?")
+
+
 def test_a_planner_that_breaks_the_contract_is_told_with_the_problem(
     lines: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -61,6 +86,22 @@ def test_a_planner_that_breaks_the_contract_is_told_with_the_problem(
     number = told.output.rpartition("--seed ")[2].strip()
     again = CliRunner().invoke(app, ["check-planner", lines, "--problems", "1", "--seed", number])
     assert again.output == told.output
+
+
+@pytest.mark.parametrize(
+    ("promise", "wrong", "shown"),
+    [
+        ("moving_obstacles", "it promises moving_obstacles, and it meets one", "a disc of radius 1.5 fields moves"),
+        ("turning_radius", "it promises turning_radius, and its line", "turning radius "),
+        ("speeds, any_angle", "", ""),
+    ],
+)
+def test_a_promise_that_is_not_kept_is_told_with_the_problem(lines: str, promise: str, wrong: str, shown: str) -> None:
+    text = Path("lines.py").read_text(encoding="utf-8")
+    promises = ", ".join(f"{one}=True" for one in promise.split(", "))
+    Path("lines.py").write_text(text.replace("Capabilities()", f"Capabilities({promises})"), encoding="utf-8")
+    told = CliRunner().invoke(app, ["check-planner", lines, "--problems", "20"])
+    assert told.exit_code == (3 if wrong else 0) and wrong in told.output and shown in told.output, told.output
 
 
 def test_a_planner_that_does_not_answer_for_long_is_told(lines: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,18 +125,44 @@ def test_one_that_is_not_there_is_one_line(lines: str, name: str, says: str) -> 
     assert told.exit_code == 2 and says in told.output and len(told.output.splitlines()) == 1
 
 
-def test_a_package_may_register_a_name(lines: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "lines-1.0.dist-info"
-    folder.mkdir()
-    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: lines\nVersion: 1.0\n")
-    (folder / "entry_points.txt").write_text("[rover_companion.planners]\nlines = lines:Lines\n")
+def install(part: str, group: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if a package of the module's name were installed, which registers the part by that name."""
+    name = part.partition(":")[0]
+    told = folder / f"{name}-1.0.dist-info"
+    told.mkdir()
+    (told / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (told / "entry_points.txt").write_text(f"[{group}]\n{name} = {part}\n")
+    monkeypatch.syspath_prepend(str(folder))
+
+
+def test_a_package_may_register_a_planner(lines: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(UnknownPlannerError):
         make_planner("lines", PlannerSettings())
-    monkeypatch.syspath_prepend(str(tmp_path))
+    install(lines, "rover_companion.planners", tmp_path, monkeypatch)
     planner: Planner = make_planner("lines", PlannerSettings())
     assert planner.name == "lines"
     with pytest.raises(UnknownPlannerError, match=r"did you mean 'lines'"):
         make_planner("liness", PlannerSettings())
+
+
+def test_a_package_may_register_a_controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    dice = written("planners.md", "Dice", tmp_path, monkeypatch)
+    with pytest.raises(ValidationError, match="unknown controller 'dice'"):
+        Settings.model_validate({"guidance": {"controller": "dice"}})
+    install(dice, "rover_companion.controllers", tmp_path, monkeypatch)
+    assert Settings.model_validate({"guidance": {"controller": "dice"}}).guidance.controller == "dice"
+    assert type(motion_planner("dice", 1)).__name__ == "Dice"
+
+
+def test_a_package_may_register_a_world(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    orchard = written("worlds.md", "Orchard", tmp_path, monkeypatch)
+    make = ["world", "make", "orchard", "--out", "worlds", "--set", "row_m=3"]
+    told = CliRunner().invoke(sitl, make)
+    assert told.exit_code == 2 and "orchard" in told.output
+    install(orchard, "rover_companion.worlds", tmp_path, monkeypatch)
+    made = CliRunner().invoke(sitl, make)
+    assert made.exit_code == 0, made.output
+    assert GroundSpec.of("orchard row_m=3") is not None
 
 
 @pytest.mark.thorough

@@ -52,5 +52,10 @@ def test_wang_table4(tmp_path):
         )
         bare = variants["no straight line", number]
         assert bare["first_generations"] > 0 and bare["offline_length_m"] >= usual["offline_length_m"] - 30.0
+    for entry in figures["results"]:
+        assert 0 <= entry["offline_first_generations"] <= 5000 and entry["offline_first_ms"] > 0.0
+    page = (docs / "results.md").read_text(encoding="utf-8")
+    fewer = sum(one["first_generations"] < one["offline_first_generations"] for one in figures["results"])
+    assert f"generations until the first feasible path in {fewer}, time until then in " in page
     assert (docs / "images" / "wang-table4.png").stat().st_size > 10_000
     assert "Wang, Sillitoe & Mulvaney 2007" in (docs / "results.md").read_text(encoding="utf-8")

@@ -5,7 +5,6 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from companion.cli.bends import tightest_radius, too_tight
 from companion.cli.commands import app
 from companion.cli.images import (
     CURVE_COLOUR,
@@ -16,6 +15,7 @@ from companion.cli.images import (
     TARGET_COLOUR,
     TIGHT_COLOUR,
 )
+from companion.planning.line_to_drive import tightest_radius, too_tight
 
 MAP = """type octile
 height 6

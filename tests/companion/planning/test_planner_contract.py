@@ -7,14 +7,15 @@ from hypothesis import strategies as st
 from scipy.ndimage import label
 
 from companion.core.grid import Cell
-from companion.planning.planner_contract import broken_by, random_problem, reachable
-from companion.planning.problem import Budget, PlanningProblem
+from companion.planning.contract_problems import BUDGET, random_problem, tasks_for
+from companion.planning.planner import Capabilities, RandomPlanner
+from companion.planning.planner_contract import broken_by, reachable
+from companion.planning.problem import Path, PlanningProblem
 from companion.planning.registry import PLANNERS, make_planner
 from companion.settings import PlannerSettings
 from tests.support.paths import is_path
 from tests.support.quick import examples
 
-BUDGET = Budget(min_epochs=2, max_epochs=15, control_points=(4, 6), population=18)
 SETTINGS = PlannerSettings.model_validate({"sedighi": {"population": 20, "generations": 40}})
 
 
@@ -45,6 +46,60 @@ def test_contract(name, problem, seed):
     planner = make_planner(name, SETTINGS)
     assert planner.name == name
     assert broken_by(planner, problem, BUDGET, seed) == ""
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_what_capabilities_promise_is_kept(name):
+    planner = make_planner(name, SETTINGS)
+    for number in range(20):
+        for problem, budget in tasks_for(planner.capabilities, number)[1:]:
+            assert broken_by(planner, problem, budget, number) == "", number
+
+
+class Broken(RandomPlanner):
+    """The paths of a good planner, with a line or speeds of its own, and promises that it does not keep."""
+
+    name = "broken"
+
+    def __init__(self, promised, inner="astar", line=None, speed=None):
+        self.capabilities, self.line, self.speed = Capabilities(**dict.fromkeys(promised, True)), line, speed
+        self.inner = make_planner(inner, SETTINGS)
+
+    def _search(self, problem, weights, budget, seed):
+        path = self.inner.plan(problem, budget, np.random.default_rng(seed)).path
+        curve = self.line(problem) if self.line else path and path.curve
+        speeds = self.speed and np.full(len(curve) - 1, self.speed)
+        return path and Path(path.cells, path.cost, curve, speeds), 1, 0, 0
+
+
+def straight(problem):
+    return np.array((problem.start, problem.target), float)
+
+
+def nowhere(problem):
+    return np.empty((0, 2))
+
+
+@pytest.mark.parametrize(
+    ("broken", "says"),
+    [
+        (Broken(["any_angle"], line=straight), "its curve is the line to drive, and has a fault: "),
+        (Broken(["smooth_curve"], line=straight), "fields away from its path"),
+        (Broken(["any_angle"], line=nowhere), "does not begin at the start"),
+        (Broken(["optimal"], "prm"), "its capabilities say neither smooth_curve nor any_angle"),
+        (Broken(["optimal", "any_angle"], "prm"), "it promises optimal, and its path costs"),
+        (Broken(["moving_obstacles"]), "it promises moving_obstacles, and it meets one"),
+        (Broken(["moving_obstacles", "any_angle"], "vertex"), "it promises moving_obstacles, and it meets one"),
+        (Broken(["turning_radius"]), "tighter than the radius"),
+        (Broken(["turning_radius", "any_angle"], "theta-star"), "its line sets out"),
+        (Broken(["any_angle", "speeds"], "theta-star"), "without speeds"),
+        (Broken(["any_angle"], "theta-star", speed=1.0), "it gives speeds, and"),
+        (Broken(["any_angle", "speeds"], "theta-star", speed=3.0), "it gives a speed outside 0.2 to 2 fields/s"),
+    ],
+)
+def test_broken_planners_are_found(broken, says):
+    tasks = [(number, *task) for number in range(30) for task in tasks_for(broken.capabilities, number)]
+    assert any(says in broken_by(broken, problem, budget, number) for number, problem, budget in tasks)
 
 
 @given(problem=problems(), seed=st.integers(0, 2**32 - 1))

@@ -27,7 +27,7 @@ def grids(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def report(grids: Path) -> TableReport:
     calls: list[tuple[int, int]] = []
     made = run(Options(runs=1, maps=grids), lambda done, total: calls.append((done, total)))
-    assert calls[-1] == (30, 30)
+    assert calls[-1] == (40, 40)
     return made
 
 
@@ -38,6 +38,34 @@ def test_what_was_searched_and_found(report: TableReport):
     assert found["tiny", "sedighi"] == [True] and found["shut", "sedighi"] == [False]
     assert found["SPSet07", "geisler"] == found["SPSet07", "hermanu"] == [False]
     assert len(report.tables()) == 2
+
+
+def test_the_local_search_stands_beside_the_papers_methods(report: TableReport):
+    row = next(line for line in report.section().splitlines() if line.startswith("| SPSet07"))
+    local, whole = (report.entry("SPSet07", method).percent(1) for method in ("sedighi-local", "sedighi"))
+    assert row.split(" | ")[-2:] == [f"{whole:.1f} (86.7)", f"{local:.1f} |"]
+
+
+def test_spaces_that_only_the_search_over_the_whole_square_crosses_are_named(report: TableReport):
+    assert not report.entry("SPSet06", "sedighi-local").paths() and report.entry("SPSet06", "sedighi").paths()
+    assert "`sedighi-local` never crosses SPSet06, " in report.section()
+
+
+def test_where_the_switches_are_not_found_the_local_search_is_counted(tmp_path: Path):
+    corners = """10
+0000000000
+0111111111
+0100000000
+0101111110
+0101000000
+0101011111
+0101010000
+0101010110
+0101010100
+0001000100"""
+    (tmp_path / "corners.txt").write_text(corners, encoding="utf-8")
+    text = run(Options(runs=1, maps=tmp_path), lambda done, total: None).section()
+    assert "a way over corners with its 2 switches" in text and "`sedighi-local` found one in 0 of 1\n" in text
 
 
 def test_what_is_written(report: TableReport, tmp_path: Path):

@@ -1,14 +1,35 @@
-"""How sharply a line bends, and where a rover with a turning radius could not follow it."""
+"""The line to drive along a path: where it sets out, how sharply it bends, and where a rover could not follow it."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.planning.problem import Path
+
 Line = NDArray[np.float64]
+
+AHEAD_DEG = 10.0
+"""A line that starts this near to the rover's heading can be driven: its first step is a chord of an arc."""
 
 TOLERANCE = 0.95
 """A line is sampled, so its radius is only exact to some per cent."""
+
+
+def line_of(path: Path) -> Line:
+    """The path's curve, or else the line through the middles of its fields.
+
+    Shape (n, 2), in fields.
+    """
+    return path.cell_array.astype(np.float64) if path.curve is None else path.curve
+
+
+def bearing_of(line: Line) -> float:
+    """The direction in which a line starts: 0 along +x, growing towards +y."""
+    x, y = next(step for step in line - line[0] if step.any())
+    return math.atan2(y, x)
 
 
 def tightest_radius(line: Line) -> float:
