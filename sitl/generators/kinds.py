@@ -16,7 +16,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from companion.core.own_parts import OwnKind, OwnPartError, looks_own, own_part
-from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, disc, empty, fill, free, wall
+from sitl.generators.canvas import EAST_M, NORTH_M, disc, empty, fill, free, wall
+from sitl.generators.graded_posts import graded, room_at
+from sitl.generators.posts import WEST_M, lattice_shape, smooth, stand
+from sitl.generators.shortest_way import BODY_M, Place
 from sitl.world.world import Obstacles
 
 NARROWEST_M = 1.3
@@ -58,6 +61,15 @@ class Parameters(BaseModel, ABC):
     @abstractmethod
     def draw(self, rng: np.random.Generator) -> Obstacles:
         """Where something stands, on fields of ``FINE_M`` from the south-west corner: see ``canvas``."""
+
+    def between(self, solid: Obstacles, start_m: Place, goal_m: Place, rng: np.random.Generator) -> Obstacles:
+        """What was drawn, now that the ends are known; by default as it is."""
+        return solid
+
+    @property
+    def beside_m(self) -> float:
+        """There is a way with so much room on both sides."""
+        return BODY_M
 
 
 class Clutter(Parameters):
@@ -250,20 +262,26 @@ class Cylinders(Parameters):
     filled: float = Field(0.12, ge=0.0, le=0.3, description="share of the lattice that is filled at first")
     smoothed: int = Field(1, ge=0, le=4, description="rounds of the automaton")
     step_m: float = Field(0.4, ge=0.15, le=1.0, description="side of a cell of the lattice; a post is half as wide")
+    difficulty: float = Field(
+        0.0, ge=0.0, le=1.0, description="how hard; `filled` is searched for it. 0: `filled` counts as it is given"
+    )
 
     def draw(self, rng: np.random.Generator) -> Obstacles:
         """See ``Parameters``."""
-        solid, west_m = empty(), 10.0
-        rows, columns = round(NORTH_M / self.step_m), round((EAST_M - 2.0 * west_m) / self.step_m)
-        lattice = rng.random((rows, columns)) < self.filled
-        for _ in range(self.smoothed):
-            padded = np.pad(lattice, 1).astype(np.int8)
-            near = sum(padded[y : y + rows, x : x + columns] for y in range(3) for x in range(3))
-            lattice = (near >= 4) | (lattice & (near >= 2))
-        for row, column in np.argwhere(lattice):
-            north_m, east_m = (row + 0.5) * self.step_m, west_m + (column + 0.5) * self.step_m
-            disc(solid, north_m, east_m, 0.25 * self.step_m + 0.5 * FINE_M)
-        return solid
+        if self.difficulty > 0.0:
+            return empty()
+        return stand(smooth(rng.random(lattice_shape(self.step_m, WEST_M)) < self.filled, self.smoothed), self.step_m)
+
+    def between(self, solid: Obstacles, start_m: Place, goal_m: Place, rng: np.random.Generator) -> Obstacles:
+        """See ``Parameters``."""
+        if self.difficulty <= 0.0:
+            return solid
+        return graded(self.difficulty, self.step_m, self.smoothed, (start_m, goal_m), rng)
+
+    @property
+    def beside_m(self) -> float:
+        """See ``Parameters``."""
+        return room_at(self.difficulty)
 
 
 KINDS: dict[GroundKind, type[Parameters]] = {
