@@ -34,8 +34,9 @@ def smooth(lattice: Lattice, rounds: int) -> Lattice:
 
 def places_of(lattice: Lattice, step_m: float, west_m: float) -> NDArray[np.float64]:
     """Where the posts stand: metres north and east, shape (n, 2)."""
-    cells = np.argwhere(lattice).astype(np.float64)
-    return cells * step_m + np.array((0.5 * step_m, west_m + 0.5 * step_m))
+    corner_m = np.array((0.0, west_m))
+    places_m: NDArray[np.float64] = (np.argwhere(lattice) + 0.5) * step_m + corner_m
+    return places_m
 
 
 def radius_of(step_m: float) -> float:
