@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from companion.mission.load import load_mission
 from sitl.cli.commands import app
 from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, disc, empty
-from sitl.generators.kinds import KINDS, Forest, GroundKind, Maze, Rooms
+from sitl.generators.kinds import KINDS, Forest, GroundKind, Maze, Rooms, Yard
 from sitl.generators.made_ground import MadeGround, NoWayError, made
 from sitl.generators.shortest_way import BODY_M
 from sitl.scenario import scenario_from_mission
@@ -41,6 +41,21 @@ def test_parameters_change_what_they_say() -> None:
     assert wide > 1.5 * narrow
     with pytest.raises(ValidationError, match=r"most_door_m 1.5 is less than least_door_m 3"):
         Rooms(least_door_m=3.0, most_door_m=1.5)
+
+
+def test_a_yard_has_a_house_and_hedges_where_they_are_asked_for_and_its_gates_stay() -> None:
+    plain = made(GroundKind.YARD, 0).world.obstacles
+    house = made(GroundKind.YARD, 0, Yard(house=1)).world.obstacles
+    norths, easts = np.nonzero(house & ~plain)
+    assert house[norths.min() : norths.max() + 1, easts.min() : easts.max() + 1].all(), "no door, and a container less"
+    assert (np.ptp(norths) + 1) * FINE_M == pytest.approx(8.0) and (np.ptp(easts) + 1) * FINE_M == pytest.approx(4.5)
+    hedged = made(GroundKind.YARD, 0, Yard(hedges=2, hedge_m=0.6)).world.obstacles
+    assert (hedged & ~plain).any(axis=0).sum() == 12, "columns of two hedges"
+    fences = np.flatnonzero(plain[1:-1, 1:-1].mean(axis=0) > 0.7) + 1
+    beside = [column for column in fences if (hedged & ~plain)[:, column + 1].any()]
+    assert len(beside) == 2
+    for column in beside:
+        assert np.array_equal(hedged[1:-1, column + 6], plain[1:-1, column]), "open where the fence is"
 
 
 def test_ground_without_a_way_is_not_looked_for_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
