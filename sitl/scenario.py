@@ -133,12 +133,12 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     drivetrain = SIM_ROVER if motors is None else two_wheels(motors.top_speed_m_s, motors.lag_s, motors.track_m)
     scenario = Scenario(world, start, sensors, outline, parameters, drivetrain=drivetrain)
     if spec.parameters is None:
-        return _steered(scenario, turning_radius_m)
+        return steered(scenario, turning_radius_m)
     try:
         file = load_parameters(spec.parameters)
     except ParameterFileError as error:
         raise ScenarioError(str(error)) from error
-    scenario = _steered(scenario, _fitting_radius_m(turning_radius_m, spec, file))
+    scenario = steered(scenario, _fitting_radius_m(turning_radius_m, spec, file))
     kept = {name: file.types.get(name, REAL32) for name in file.unknown}
     parameters = {**scenario.parameters, **file.known, **file.unknown}
     return replace(scenario, parameters=parameters, kept=kept, parameter_file=file)
@@ -159,7 +159,7 @@ def size_in_words(rover: RoverSpec) -> str:
     return f"{rectangle.front_m + rectangle.rear_m:g} x {2.0 * rectangle.half_width_m:g} m"
 
 
-def _steered(scenario: Scenario, turning_radius_m: float) -> Scenario:
+def steered(scenario: Scenario, turning_radius_m: float) -> Scenario:
     """The scenario with steered wheels; unchanged for radius 0."""
     if turning_radius_m <= 0.0:
         return scenario

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,8 @@ USUAL_SENSORS = "lidar-360"
 """On generated ground."""
 STREAM = 71
 """Separates what the rover is like from all other random draws with the same seed."""
+GROUNDS = 4
+"""So many are kept: a run drives on the ground of the run before, or on one from shortly before."""
 LOOK_S = 0.5
 LEAST_S = 1.0
 """Of the time in one metre square that is kept."""
@@ -61,7 +64,9 @@ def drive(spec: RunSpec, folder: Path) -> RunResult:
         targets = len(run.mission.targets)
         watch = WireWatch(run)
         run.run(lambda status: near.look(run), LOOK_S)
-        return _result(run, near.clearance_m, watch, processor_s() - began_s)
+        ground = _ground_of(spec.world, spec.seed)
+        result = _result(run, near.clearance_m, watch, processor_s() - began_s)
+        return result if ground is None else replace(result, ground=ground.difficulty)
     except NoWayError as error:
         return RunResult("", NO_GROUND, cpu_s=processor_s() - began_s, said=str(error)[:300])
     except Exception as error:
@@ -90,13 +95,14 @@ def settings_of(spec: RunSpec) -> Settings:
 
 def mission_of(spec: RunSpec, folder: Path) -> Mission:
     """The mission that is driven, with the run's sensors."""
-    return _mission_on(_ground_of(spec), spec, folder)
+    return _mission_on(_ground_of(spec.world, spec.seed), spec, folder)
 
 
-def _ground_of(spec: RunSpec) -> MadeGround | None:
-    """None: a mission's file says where it is driven. Raises NoWayError."""
-    ground = GroundSpec.of(spec.world)
-    return None if ground is None else made(ground.kind, spec.seed, ground.given, ground.movers)
+@lru_cache(maxsize=GROUNDS)
+def _ground_of(world: str, seed: int) -> MadeGround | None:
+    """None: a mission's file says where it is driven. Kept, for the same ground's next run. Raises NoWayError."""
+    ground = GroundSpec.of(world)
+    return None if ground is None else made(ground.kind, seed, ground.given, ground.movers)
 
 
 def _mission_on(ground: MadeGround | None, spec: RunSpec, folder: Path) -> Mission:
@@ -113,7 +119,7 @@ def check_spec(spec: RunSpec, folder: Path) -> None:
 
 
 def _mission_and_scenario(spec: RunSpec, folder: Path) -> tuple[Mission, Scenario]:
-    ground = _ground_of(spec)
+    ground = _ground_of(spec.world, spec.seed)
     mission = _mission_on(ground, spec, folder)
     scenario = scenario_from_mission(mission)
     if ground is not None:

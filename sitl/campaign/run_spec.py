@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass, fields
 from itertools import product
 
 from sitl.campaign.campaign_file import CampaignTable
+from sitl.generators.measures import Difficulty
 
 ID_LENGTH = 12
 
@@ -94,6 +95,9 @@ class RunResult:
     """The last thing that the companion said, or the error."""
     dwelt: tuple[tuple[int, int, float], ...] = ()
     """Where the time went: metres north and east of the world's corner, rounded down, and seconds, 1 or more."""
+    ground: Difficulty | None = None
+    """How difficult the generated ground was; None: a mission's file says where it is driven, or an error ended
+    the run."""
 
     @property
     def complete(self) -> bool:

@@ -29,6 +29,7 @@ from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.worded import GroundSpec, SensorSpec
 from sitl.experiments.experiment import code_digest
+from sitl.generators.measures import Difficulty
 
 MOST_BYTES = 2_000_000_000
 
@@ -131,7 +132,9 @@ def _lines(file: Path) -> list[str]:
 
 
 def _result(values: dict[str, Any]) -> RunResult:
-    return RunResult(**{**values, "dwelt": tuple((int(n), int(e), float(s)) for n, e, s in values["dwelt"])})
+    dwelt = tuple((int(n), int(e), float(s)) for n, e, s in values["dwelt"])
+    ground = None if values["ground"] is None else Difficulty(**values["ground"])
+    return RunResult(**{**values, "dwelt": dwelt, "ground": ground})
 
 
 def _check_of(body: dict[str, Any]) -> str:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 
 from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.policies import broken
 from sitl.campaign.summary import Runs
+from sitl.generators.measures import Difficulty
 
-LEFT_OUT = ("dwelt",)
+LEFT_OUT = ("dwelt", "ground")
 
 
 def write_csv(file: Path, runs: Runs) -> None:
@@ -45,6 +46,7 @@ def records_of(runs: Runs) -> list[dict[str, object]]:
             **{name: value for name, value in asdict(result).items() if name not in LEFT_OUT},
             "complete": result.complete,
             "broken": " ".join(broken(result)),
+            **{one.name: getattr(result.ground, one.name, None) for one in fields(Difficulty)},
         }
         for spec, result in runs
     ]

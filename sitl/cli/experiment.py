@@ -120,6 +120,14 @@ def experiment(
             help="gates: the rover's outline in metres, 2.0x0.5 for example; default: 0.9x0.7.",
         ),
     ] = "",
+    turning_radius: Annotated[
+        float,
+        typer.Option(
+            min=0.0,
+            max=10.0,
+            help="driving: the random grounds alone, with steered wheels whose tightest arc has this radius in metres.",
+        ),
+    ] = 0.0,
     keep: Annotated[
         Path | None,
         typer.Option(
@@ -152,7 +160,7 @@ def experiment(
         _refuse_unused(name, planners=planners, world=world, maps=maps)
         options = Options(
             runs, seed, jobs, maps, tuple(world or ()), names_in(planners), worlds, names_in(controllers),
-            names_in(setups), guard, off, late, keep, names_in(missions), _outline_m(outline),
+            names_in(setups), guard, off, late, keep, names_in(missions), _outline_m(outline), turning_radius,
         )  # fmt: skip
         _refuse_unused_motion(name, options)
         report = _with_progress(name, options, console)
@@ -197,6 +205,10 @@ def _refuse_unused_motion(name: str, options: Options) -> None:
         raise ExperimentError(f"--worlds: {name} does not take it; the option is for barn")
     if options.outline_m is not None and name != "gates":
         raise ExperimentError(f"--outline: {name} does not take it; the option is for gates")
+    if options.turning_radius_m and name != "driving":
+        raise ExperimentError(f"--turning-radius: {name} does not take it; the option is for driving")
+    if options.turning_radius_m and options.worlds:
+        raise ExperimentError("--turning-radius: with it the random grounds alone are driven; leave out --world")
     if options.setups and name not in ("barn", "gates"):
         raise ExperimentError(f"--setups: {name} does not take it; the option is for barn and gates")
     for option, is_given, takers in (

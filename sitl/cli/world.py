@@ -18,7 +18,7 @@ from companion.storage.validation import alike, describe_first
 from sitl.generators.canvas import FINE_M
 from sitl.generators.kinds import GroundKind, Parameters, is_kind, parameters_of
 from sitl.generators.made_ground import MadeGround, NoWayError, made
-from sitl.generators.measures import Difficulty, difficulty
+from sitl.generators.measures import Difficulty
 
 app = typer.Typer(add_completion=False, name="world", help="Worlds from seeds.", no_args_is_help=True)
 
@@ -59,7 +59,7 @@ def make(
         mission = out / f"{kind.replace(':', '-')}-{seed}.toml"
         writable(mission)
         ground = made(kind, seed, given, movers)
-        measures = difficulty(ground)
+        measures = ground.difficulty
         with written(mission):
             _write(ground, seed, given, measures, mission)
         if image is not None:

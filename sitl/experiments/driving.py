@@ -144,9 +144,14 @@ class DrivingReport(ExperimentReport):
             ],
         }
 
+    @property
+    def section_name(self) -> str:
+        """Steered wheels stand beside the usual rovers."""
+        return f"{NAME}-steered" if self.options.turning_radius_m else NAME
+
     def pictures(self) -> dict[str, Figure]:
         """See ``ExperimentReport``."""
-        return {NAME: self._draw()}
+        return {self.section_name: self._draw()}
 
     def _courses(self) -> list[str]:
         return list(dict.fromkeys(series.course for series in self.series))
@@ -192,11 +197,15 @@ class DrivingReport(ExperimentReport):
         courses = self._courses()
         tables = "\n\n".join(f"{name}:\n\n{markdown_table(HEAD, self._rows(name))}" for name in courses)
         runs, first = self.options.runs, self.options.seed
-        return f"""## What the rover feels: driving times
+        radius_m = self.options.turning_radius_m
+        title = "Driving times with steered wheels" if radius_m else "What the rover feels: driving times"
+        steered = f", for a rover with steered wheels whose tightest arc has a radius of {radius_m:g} m,"
+        driven = f"Random grounds (*made*){steered}" if radius_m else "Shipped missions and random grounds (*made*)"
+        return f"""## {title}
 
 `{self.options.command(NAME)}`
 
-Shipped missions and random grounds (*made*) in lock-step, with the rover's dynamics and sensor noise, led by points,
+{driven} in lock-step, with the rover's dynamics and sensor noise, led by points,
 with several planners in the navigator. Each row is made of {runs} drives, with seeds {first} to {first + runs - 1}, the
 same for all; each seed is another ground of its kind. *time s*: mean driving time of the drives that reached all
 targets; */ {REFERENCE}*: the same over that planner's, of the seeds with which both did; in brackets 95 % intervals, by
@@ -216,7 +225,7 @@ All together, for each seed the mean over the courses:
 
 Driving times do not depend on the computer; plan ms (all planning of a drive) was measured on {where_measured()}.
 
-![Driving times](images/{NAME}.png)
+![Driving times](images/{self.section_name}.png)
 """
 
 
@@ -285,15 +294,15 @@ def _misses(missed: list[str]) -> str:
 
 def run(options: Options, advance: Advance) -> DrivingReport:
     """Make all drives. The result (but for planning times) does not depend on ``jobs``."""
-    courses: dict[str, Mission | str] = {**_shipped(options), **{f"made {kind}": kind.value for kind in KINDS}}
-    courses |= _given(options)
+    shipped = {} if options.turning_radius_m else _shipped(options)
+    courses: dict[str, Mission | str] = {**shipped, **{f"made {kind}": kind.value for kind in KINDS}, **_given(options)}
     planners = tuple(dict.fromkeys((*planners_of(options, DRIVEN), REFERENCE)))
     for planner in planners:
         warm_up(settings_with(planner))
     keys = [(name, planner, False) for name in courses for planner in planners]
     keys += [(name, REFERENCE, True) for name in courses]
     tasks = [(key, options.seed + i) for key in keys for i in range(options.runs)]
-    calls = ((courses[name], planner, seed, known) for (name, planner, known), seed in tasks)
+    calls = ((courses[name], planner, seed, known, options.turning_radius_m) for (name, planner, known), seed in tasks)
     collected: dict[tuple[str, str, bool], list[CourseDrive]] = {key: [] for key in keys}
     made = each(options.jobs, drive, calls, options.keep)
     for done, ((key, _), one) in enumerate(zip(tasks, made, strict=True), start=1):

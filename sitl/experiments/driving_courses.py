@@ -5,7 +5,7 @@ Nouns: course.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from sitl.experiments.navigation import settings_with
 from sitl.experiments.time_bound import UNKNOWN_S, time_bound_s
 from sitl.generators.made_ground import made
 from sitl.lockstep import Drive, DriveOutcome, Report
-from sitl.scenario import scenario_from_mission
+from sitl.scenario import scenario_from_mission, steered
 from sitl.world.truth import SimStart
 from sitl.world.world import World
 
@@ -46,17 +46,21 @@ class CourseDrive:
         return ended and all(status is TargetStatus.REACHED for _, status in self.report.targets)
 
 
-def drive(course: Mission | str, planner: str, seed: int, known: bool = False) -> CourseDrive:
+def drive(
+    course: Mission | str, planner: str, seed: int, known: bool = False, turning_radius_m: float = 0.0
+) -> CourseDrive:
     """One drive in lock-step. ``course``: a mission, or a kind of ground, of which each seed draws another one.
 
-    ``known``: the companion has the true map from the start; ``bound_s`` is worked out.
+    ``known``: the companion has the true map from the start; ``bound_s`` is worked out. ``turning_radius_m``: on
+    generated ground, of a rover with steered wheels; 0: it turns on the spot.
     """
     if isinstance(course, Mission):
         mission, scenario = course, scenario_from_mission(course)
     else:
         ground = made(course, seed)
         mission = mission_on(ground, POINTS, seed)
-        scenario = scenario_on(ground, mission.rover, POINTS)
+        mission = replace(mission, rover=replace(mission.rover, turning_radius_m=turning_radius_m))
+        scenario = steered(scenario_on(ground, mission.rover, POINTS), turning_radius_m)
     run = Drive(mission, scenario, settings_with(planner), seed, NullRecorder(), TIME_LIMIT_S)
     told = _ToldMap(run) if known else None
     report = run.run() if told is None else run.run(told.observe, TELL_S)

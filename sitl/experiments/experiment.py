@@ -77,6 +77,8 @@ class Options:
     """Which of those that ship with the project; none: all."""
     outline_m: tuple[float, float] | None = None
     """``gates``: length and width of the rover; None: the experiment's own."""
+    turning_radius_m: float = 0.0
+    """``driving``: of a rover with steered wheels, on generated ground alone; 0: the experiment's own rovers."""
 
     def command(self, name: str) -> str:
         """What writes this experiment's part of the results page again."""
@@ -88,6 +90,7 @@ class Options:
         chosen += "" if self.off == OFF_MODEL else f" --off {self.off:g}"
         chosen += f" --late {self.late_s:g}" if self.late_s else ""
         chosen += "" if self.outline_m is None else f" --outline {'x'.join(f'{one:g}' for one in self.outline_m)}"
+        chosen += f" --turning-radius {self.turning_radius_m:g}" if self.turning_radius_m else ""
         chosen += f" --worlds {self.archive.name}" if self.archive else ""
         chosen += f" --maps {self.maps.name}" if self.maps else ""
         return f"rover-sitl experiment {name} --runs {self.runs} --seed {self.seed}{chosen} --docs docs"

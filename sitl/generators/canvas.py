@@ -46,6 +46,15 @@ def disc(solid: Obstacles, north_m: float, east_m: float, radius_m: float) -> No
     solid[near] |= np.hypot(north_to_m[:, None], east_to_m[None, :]) < radius_m
 
 
+def with_ends(solid: Obstacles, *ends_m: tuple[float, float]) -> Obstacles:
+    """The same ground: nothing stands at its ends, and its edges are shut."""
+    for north_m, east_m in ends_m:
+        free(solid, north_m - 1.5, east_m - 1.5, 3.0, 3.0)
+    solid[[0, -1], :] = True
+    solid[:, [0, -1]] = True
+    return solid
+
+
 def wall(
     solid: Obstacles,
     rng: np.random.Generator,

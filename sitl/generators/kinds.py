@@ -10,17 +10,23 @@ from __future__ import annotations
 import zlib
 from abc import ABC, abstractmethod
 from enum import StrEnum
+from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from companion.core.own_parts import OwnKind, OwnPartError, looks_own, own_part
-from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, disc, empty, fill, free, wall
+from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, area, disc, empty, fill, free, wall
+from sitl.generators.graded_posts import graded, room_at
+from sitl.generators.posts import WEST_M, lattice_shape, smooth, stand
+from sitl.generators.shortest_way import BODY_M, Place
 from sitl.world.world import Obstacles
 
 NARROWEST_M = 1.3
 """Of what a parameter may say: everywhere a way with 0.6 m on both sides is asked for."""
+Rectangle = tuple[float, float, float, float]
+"""Metres: its south and west edge, height and width."""
 
 
 class GroundKind(StrEnum):
@@ -58,6 +64,15 @@ class Parameters(BaseModel, ABC):
     @abstractmethod
     def draw(self, rng: np.random.Generator) -> Obstacles:
         """Where something stands, on fields of ``FINE_M`` from the south-west corner: see ``canvas``."""
+
+    def between(self, solid: Obstacles, start_m: Place, goal_m: Place, rng: np.random.Generator) -> Obstacles:
+        """What was drawn, now that the ends are known; by default as it is."""
+        return solid
+
+    @property
+    def beside_m(self) -> float:
+        """There is a way with so much room on both sides."""
+        return BODY_M
 
 
 class Clutter(Parameters):
@@ -110,27 +125,57 @@ class Rooms(Parameters):
 
 
 class Yard(Parameters):
-    """Fences across the way, with gates, and containers between them."""
+    """Fences across the way, with gates, and containers between them; on request a house and hedges."""
 
     least_gate_m: float = Field(
         1.3, ge=NARROWEST_M, le=5.0, description="width of gates; narrower than 1.5 m seldom has a way"
     )
     most_gate_m: float = Field(2.0, ge=NARROWEST_M, le=5.0, description="width of gates")
     most_containers: int = Field(3, ge=1, le=8, description="between two fences")
+    house: int = Field(0, ge=0, le=2, description="houses without a door, each between two fences")
+    house_long_m: float = Field(8.0, ge=3.0, le=16.0, description="length of a house, along the fences")
+    house_wide_m: float = Field(4.5, ge=2.0, le=5.0, description="width of a house, from fence to fence")
+    hedges: int = Field(0, ge=0, le=4, description="each along the east side of a fence; its gates stay open")
+    hedge_m: float = Field(0.8, ge=0.3, le=1.5, description="thickness of hedges")
 
     def draw(self, rng: np.random.Generator) -> Obstacles:
-        """See ``Parameters``."""
-        solid = empty()
-        east_m = float(rng.uniform(8.0, 11.0))
-        while east_m < EAST_M - 7.0:
+        """See ``Parameters``. House and hedges have random numbers of their own: the fences stay where they were."""
+        solid, fences_m, containers = empty(), [float(rng.uniform(8.0, 11.0))], list[Rectangle]()
+        while fences_m[-1] < EAST_M - 7.0:
+            east_m = fences_m[-1]
             wall(solid, rng, 0.0, east_m, NORTH_M, (self.least_gate_m, self.most_gate_m), along_north=True)
             following_m = east_m + float(rng.uniform(7.0, 11.0))
             for _ in range(int(rng.integers(1, self.most_containers + 1))):
                 south_m, west_m = rng.uniform((0.0, east_m + 2.5), (NORTH_M - 6.0, east_m + 4.0))
-                height_m, width_m = (2.4, 1.2) if rng.random() < 0.5 else (6.0, 2.4)
-                fill(solid, south_m, west_m, height_m, width_m)
-            east_m = following_m
+                containers.append((south_m, west_m, *((2.4, 1.2) if rng.random() < 0.5 else (6.0, 2.4))))
+            fences_m.append(following_m)
+        own_rng = rng.spawn(1)[0]
+        houses = self._houses(own_rng, fences_m[:-1])
+        for rectangle in (*houses, *(one for one in containers if not any(_meet(one, house) for house in houses))):
+            fill(solid, *rectangle)
+        for east_m in own_rng.permutation(fences_m[:-1])[: self.hedges]:
+            fence, hedge = area(0.0, east_m, NORTH_M, FINE_M), area(0.0, east_m + 0.2, NORTH_M, self.hedge_m)
+            solid[hedge] |= solid[fence]
         return solid
+
+    def _houses(self, rng: np.random.Generator, fences_m: list[float]) -> list[Rectangle]:
+        """Each in the middle between two fences that stand."""
+        between = list(pairwise(fences_m))
+        chosen = rng.permutation(len(between))[: self.house]
+        souths_m = rng.uniform(2.0, NORTH_M - 2.0 - self.house_long_m, len(chosen))
+        return [
+            (south_m, 0.5 * (sum(between[number]) + 0.2 - self.house_wide_m), self.house_long_m, self.house_wide_m)
+            for number, south_m in zip(chosen, souths_m, strict=True)
+        ]
+
+
+def _meet(one: Rectangle, other: Rectangle) -> bool:
+    """Whether there is less room than ``NARROWEST_M`` between two rectangles."""
+    return all(
+        one[axis] < other[axis] + other[axis + 2] + NARROWEST_M
+        and other[axis] < one[axis] + one[axis + 2] + NARROWEST_M
+        for axis in (0, 1)
+    )
 
 
 class Maze(Parameters):
@@ -250,20 +295,26 @@ class Cylinders(Parameters):
     filled: float = Field(0.12, ge=0.0, le=0.3, description="share of the lattice that is filled at first")
     smoothed: int = Field(1, ge=0, le=4, description="rounds of the automaton")
     step_m: float = Field(0.4, ge=0.15, le=1.0, description="side of a cell of the lattice; a post is half as wide")
+    difficulty: float = Field(
+        0.0, ge=0.0, le=1.0, description="how hard; `filled` is searched for it. 0: `filled` counts as it is given"
+    )
 
     def draw(self, rng: np.random.Generator) -> Obstacles:
         """See ``Parameters``."""
-        solid, west_m = empty(), 10.0
-        rows, columns = round(NORTH_M / self.step_m), round((EAST_M - 2.0 * west_m) / self.step_m)
-        lattice = rng.random((rows, columns)) < self.filled
-        for _ in range(self.smoothed):
-            padded = np.pad(lattice, 1).astype(np.int8)
-            near = sum(padded[y : y + rows, x : x + columns] for y in range(3) for x in range(3))
-            lattice = (near >= 4) | (lattice & (near >= 2))
-        for row, column in np.argwhere(lattice):
-            north_m, east_m = (row + 0.5) * self.step_m, west_m + (column + 0.5) * self.step_m
-            disc(solid, north_m, east_m, 0.25 * self.step_m + 0.5 * FINE_M)
-        return solid
+        if self.difficulty > 0.0:
+            return empty()
+        return stand(smooth(rng.random(lattice_shape(self.step_m, WEST_M)) < self.filled, self.smoothed), self.step_m)
+
+    def between(self, solid: Obstacles, start_m: Place, goal_m: Place, rng: np.random.Generator) -> Obstacles:
+        """See ``Parameters``."""
+        if self.difficulty <= 0.0:
+            return solid
+        return graded(self.difficulty, self.step_m, self.smoothed, (start_m, goal_m), rng)
+
+    @property
+    def beside_m(self) -> float:
+        """See ``Parameters``."""
+        return room_at(self.difficulty)
 
 
 KINDS: dict[GroundKind, type[Parameters]] = {

@@ -6,26 +6,22 @@ Nouns: made ground.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.core.grid import OBSTACLE, Cell, inflated
 from companion.core.own_parts import OwnKind, OwnPartError, blamed
 from companion.mission.mission import HomePoint, MoverSpec
-from companion.planning.problem import Budget, PlanningProblem
-from companion.planning.registry import make_planner
-from companion.settings import PlannerSettings
-from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, empty, free
+from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, empty, with_ends
 from sitl.generators.kinds import Parameters, parameters_of, stream_of
-from sitl.world.world import Obstacles, World
+from sitl.generators.measures import Difficulty, measured
+from sitl.generators.shortest_way import BODY_M, cheapest_way, coarse, shortest_m, weights_with
+from sitl.world.world import World
 from sitl.world.world_file import movers_of
 
-BODY_M = 0.6
-"""Everywhere there is a way with so much room on both sides."""
 END_M = 4.0
 """Nothing stands within this of the two ends."""
-WAY_RESOLUTION_M = 0.2
 MOST_DRAWN = 60
 GROUND_STREAM, MOVER_STREAM = 51, 52
 ROOM_M, WALL_M = 7.0, 1.0
@@ -40,7 +36,8 @@ class NoWayError(ValueError):
 class MadeGround:
     """A world, and where to drive from and to: metres north and east. There is a way.
 
-    ``way_m``: the shortest on fields of ``WAY_RESOLUTION_M``, shape (n, 2), north and east.
+    ``way_m``: the shortest on fields of ``WAY_RESOLUTION_M``, shape (n, 2), north and east; it keeps ``room_m`` on both
+    sides.
     """
 
     kind: str
@@ -49,10 +46,18 @@ class MadeGround:
     goal_m: tuple[float, float]
     way_m: NDArray[np.float64]
     movers: tuple[MoverSpec, ...] = ()
+    room_m: float = BODY_M
+
+    @cached_property
+    def difficulty(self) -> Difficulty:
+        """Of the ground as it stands, without what moves; worked out when first asked for."""
+        solid, side_m = self.world.obstacles, self.world.resolution_m
+        weights = weights_with(coarse(solid, side_m), self.room_m)
+        return measured(solid, side_m, self.way_m, shortest_m(weights, self.start_m, self.goal_m))
 
 
 def made(kind: str, seed: int, given: Parameters | None = None, movers: int = 0) -> MadeGround:
-    """The ground of a seed; drawn again until there is a way for a disc of ``BODY_M``.
+    """The ground of a seed; drawn again until there is a way with the kind's room on both sides.
 
     ``given``: the kind's parameters; None: as they are without a word. ``movers``: things that drive to and fro.
     Raises NoWayError, and OwnPartError for a kind of one's own that draws no ground.
@@ -68,31 +73,14 @@ def made(kind: str, seed: int, given: Parameters | None = None, movers: int = 0)
             raise OwnPartError(f"world {kind!r:.80} draws {solid.dtype} of shape {solid.shape}; begin with empty()")
         start_m = float(rng.uniform(END_M, NORTH_M - END_M)), 3.0
         goal_m = float(rng.uniform(END_M, NORTH_M - END_M)), EAST_M - 3.0
-        for north_m, east_m in (start_m, goal_m):
-            free(solid, north_m - 1.5, east_m - 1.5, 3.0, 3.0)
-        solid[[0, -1], :] = True
-        solid[:, [0, -1]] = True
-        way_m = _way(solid, start_m, goal_m)
+        with blamed(OwnKind.WORLD, kind):
+            solid = with_ends(parameters.between(solid, start_m, goal_m, rng), start_m, goal_m)
+        way_m = cheapest_way(weights_with(coarse(solid), parameters.beside_m), start_m, goal_m)
         if way_m is not None:
-            ground = MadeGround(kind, World(solid, FINE_M), start_m, goal_m, way_m)
+            ground = MadeGround(kind, World(solid, FINE_M), start_m, goal_m, way_m, room_m=parameters.beside_m)
             specs = _movers(ground, seed, movers)
             return replace(ground, movers=specs, world=World(solid, FINE_M, movers=movers_of(list(specs), start_m)))
     raise NoWayError(f"{kind}: with these parameters none of {MOST_DRAWN} grounds has a way; make it less dense")
-
-
-def _way(solid: Obstacles, start_m: tuple[float, float], goal_m: tuple[float, float]) -> NDArray[np.float64] | None:
-    pieces = round(WAY_RESOLUTION_M / FINE_M)
-    rows, columns = (size // pieces for size in solid.shape)
-    coarse = solid.reshape(rows, pieces, columns, pieces).any(axis=(1, 3))
-    weights = inflated(np.where(coarse, OBSTACLE, 0.5), BODY_M / WAY_RESOLUTION_M)
-    start, goal = (
-        Cell(int(east_m / WAY_RESOLUTION_M), int(north_m / WAY_RESOLUTION_M)) for north_m, east_m in (start_m, goal_m)
-    )
-    planner = make_planner("astar", PlannerSettings())
-    path = planner.plan(PlanningProblem(weights, start, goal), Budget(), np.random.default_rng(0)).path
-    if path is None:
-        return None
-    return (np.array([(cell.y, cell.x) for cell in path.cells]) + 0.5) * WAY_RESOLUTION_M
 
 
 def _movers(ground: MadeGround, seed: int, count: int) -> tuple[MoverSpec, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.mapping.distance_field import distance_field
-from sitl.generators.made_ground import MadeGround
+from sitl.world.world import Obstacles
 
 RAYS = 16
 REACH_M = 8.0
@@ -35,26 +35,27 @@ class Difficulty:
     characteristic_m: float
     """The shortest line through the place from obstacle to obstacle."""
     tortuosity: float
-    """Length of the way over the distance of its ends."""
+    """Length of the shortest way at any angle over the distance of its ends."""
 
 
-def difficulty(ground: MadeGround) -> Difficulty:
-    """Of a ground, as it stands: without what moves."""
-    way = ground.way_m[:: max(1, len(ground.way_m) // LOOKS)]
-    solid, side_m = ground.world.obstacles, ground.world.resolution_m
+def measured(solid: Obstacles, side_m: float, way_m: NDArray[np.float64], length_m: float) -> Difficulty:
+    """Of ground as it stands, without what moves.
+
+    ``solid``: fields of ``side_m``, shape (height, width). ``way_m``: the shortest way, north and east, shape (n, 2).
+    ``length_m``: of the shortest way at any angle between the same ends.
+    """
+    way = way_m[:: max(1, len(way_m) // LOOKS)]
     away_m = distance_field(solid) * side_m
     rows, columns = (way / side_m).astype(np.int64).T
     rays_m = np.array([_rays(solid, side_m, place) for place in way])
     shut = rays_m < 0.5 * REACH_M
     through_m = rays_m[:, : RAYS // 2] + rays_m[:, RAYS // 2 :]
-    steps_m = np.hypot(*np.diff(ground.way_m, axis=0).T).sum()
-    apart_m = math.hypot(*(ground.way_m[-1] - ground.way_m[0]))
     return Difficulty(
         float(away_m[rows, columns].mean()),
         float(rays_m.mean()),
         float((shut != np.roll(shut, 1, axis=1)).sum(axis=1).mean()),
         float(through_m.min(axis=1).mean()),
-        float(steps_m / apart_m),
+        length_m / math.hypot(*(way_m[-1] - way_m[0])),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ from sitl.campaign import drive_run
 from sitl.campaign.drive_run import drive
 from sitl.campaign.policies import Policy, broken
 from sitl.campaign.run_spec import RunSpec
+from sitl.generators.made_ground import made
+from sitl.generators.measures import Difficulty
 from sitl.lockstep import Drive, TrackPoint
 
 SPEC = RunSpec("maze", "hybrid", "points", "own", "none", False, 0.0, 0.0, "shipped", 1, 100.0, "{}")
@@ -47,6 +50,21 @@ def test_where_the_time_went_counts_from_the_first_movement() -> None:
     places = [(0.0, 5.0, 5.0), (40.0, 5.0, 5.0), (41.0, 5.5, 5.2), (44.0, 5.6, 5.3), (44.5, 7.0, 5.0), (46.5, 7.2, 5.1)]
     track = [TrackPoint(time_s, north_m, east_m, "-") for time_s, north_m, east_m in places]
     assert drive_run._dwelt(track) == ((5, 5, 3.5), (7, 5, 2.0))
+
+
+def test_a_run_tells_how_difficult_its_ground_was_and_works_it_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    worked_out: list[Difficulty] = []
+    monkeypatch.setattr("sitl.generators.made_ground.measured", lambda *given: worked_out.append(one) or one)
+    one = Difficulty(1.0, 4.0, 3.5, 2.5, 1.2)
+    spec = replace(SPEC, world="forest per_100_m2=1.5", seed=7, time_limit_s=1.0)
+    results = [drive(spec, Path()), drive(replace(spec, planner="astar"), Path())]
+    assert [result.ground for result in results] == [one, one] and len(worked_out) == 1
+    assert drive(replace(spec, world="missing.toml"), Path()).ground is None
+
+
+def test_the_ground_of_a_run_is_that_of_its_seed() -> None:
+    result = drive(replace(SPEC, time_limit_s=1.0), Path())
+    assert result.ground == made("maze", 1).difficulty and result.outcome == "time limit"
 
 
 def test_settings_of_a_run_have_its_planner_its_controller_and_its_variant() -> None:

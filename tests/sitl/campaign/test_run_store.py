@@ -16,10 +16,12 @@ from sitl.campaign.campaign_file import CampaignTable
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, specs_of
 from sitl.campaign.run_store import Digests, RunStore
+from sitl.generators.measures import Difficulty
 
 TABLE = CampaignTable(name="c", worlds=["clutter", "yard"], runs=3)
 SPECS = list(specs_of(TABLE))
-RESULT = RunResult("points", "reached", 1, 1, seconds=31.25, metres=40.1, said="said", dwelt=((1, 2, 3),))
+GROUND = Difficulty(1.5, 4.25, 3.5, 5.0, 1.125)
+RESULT = RunResult("points", "reached", 1, 1, seconds=31.25, metres=40.1, dwelt=((1, 2, 3),), ground=GROUND)
 
 
 def filled(folder: Path, digest: str = "d") -> RunStore:
@@ -94,6 +96,13 @@ def test_a_run_depends_on_the_source_of_its_own_controller(tmp_path: Path, monke
     together = Digests(tmp_path)
     assert together.of(shipped) != together.of(own), "one's digest is not the other's"
     assert together.of(own) == Digests(tmp_path).of(own) != ""
+
+
+def test_a_mission_has_no_measures_of_its_ground(tmp_path: Path) -> None:
+    store = RunStore(tmp_path / "runs.jsonl", lambda spec: "d")
+    store.add(SPECS[0], replace(RESULT, ground=None))
+    assert RunStore(store.file, lambda spec: "d").results[SPECS[0].id].ground is None
+    assert json.loads(filled(tmp_path).file.read_text().splitlines()[1])["result"]["ground"]["tortuosity"] == 1.125
 
 
 def test_what_ended_with_an_error_is_driven_again(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from sitl.campaign.report import page
 from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
 from sitl.campaign.summary import HEAD, PAIR_HEAD, differences, interval, labels, rows, varied
 from sitl.campaign.tables import records_of
+from sitl.generators.measures import Difficulty
 
 TABLE = CampaignTable(name="a", worlds=["clutter"], runs=20, controllers=["points", "motion-ga"])
 RESULT = RunResult("points", "reached", 1, 1, bound_s=25.0, metres=40.0, clearance_m=0.4, said="done")
@@ -115,3 +116,7 @@ def test_tables_for_other_programs_have_a_record_a_run() -> None:
     records = records_of(RUNS)
     assert len(records) == 40 and records[0]["seed"] == 0 and "dwelt" not in records[0]
     assert sum(not one["complete"] for one in records) == 1
+    ground = Difficulty(1.5, 4.25, 3.5, 5.0, 1.125)
+    measured, other = records_of([(RUNS[0][0], replace(RESULT, ground=ground)), RUNS[1]])
+    assert "ground" not in measured and measured.items() >= asdict(ground).items()
+    assert list(other) == list(measured) and other["tortuosity"] is None

@@ -17,8 +17,8 @@ from sitl.experiments.experiment import ExperimentError, Options
 from sitl.experiments.intervals import ratio_with_interval
 from sitl.generators.canvas import EAST_M, NORTH_M
 from sitl.generators.kinds import GroundKind
-from sitl.generators.made_ground import BODY_M
 from sitl.generators.made_ground import made as drawn
+from sitl.generators.shortest_way import BODY_M
 
 
 @pytest.mark.parametrize("kind", list(GroundKind))

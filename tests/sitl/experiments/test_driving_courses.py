@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from companion.core.frames import NedPoint
 from companion.core.grid import empty_grid
 from companion.mapping.evidence_map import new_map, occupied_fields
+from companion.mission.mission import Mission
 from companion.settings import Settings
-from sitl.experiments.driving import Series, together
+from sitl.cli.commands import app
+from sitl.experiments import driving_courses
+from sitl.experiments.driving import DrivingReport, Series, together
 from sitl.experiments.driving_courses import CourseDrive, drive, tell
+from sitl.experiments.experiment import Options
 from sitl.generators.made_ground import made
-from sitl.lockstep import DriveOutcome, Report
-from sitl.scenario import SOMEWHERE
+from sitl.lockstep import Drive, DriveOutcome, Report
+from sitl.scenario import SOMEWHERE, Scenario
 from sitl.world.truth import SimStart
 from sitl.world.world import World
 
@@ -63,6 +69,40 @@ def test_together_each_seed_counts_once_and_only_if_every_course_was_driven_to_i
     times_s = together([series("a", 10.0, 12.0, 14.0), series("b", 100.0, 110.0, 120.0)])
     assert times_s[:3].tolist() == [55.0, 61.0, 67.0] and math.isnan(times_s[3])
     assert series("a", 10.0).time_s == 10.0 and series("a", 10.0).missed == 1
+
+
+def test_with_a_turning_radius_companion_and_rover_have_steered_wheels(monkeypatch: pytest.MonkeyPatch) -> None:
+    radii_m: list[tuple[float, float]] = []
+
+    def noted(mission: Mission, scenario: Scenario, *rest: Any) -> Drive:
+        radii_m.append((mission.rover.turning_radius_m, scenario.turning_radius_m))
+        return Drive(mission, scenario, *rest)
+
+    monkeypatch.setattr(driving_courses, "Drive", noted)
+    monkeypatch.setattr(driving_courses, "TIME_LIMIT_S", 1.0)
+    drive("forest", "theta-star", 0, turning_radius_m=2.5)
+    drive("forest", "theta-star", 0)
+    assert radii_m == [(2.5, 2.5), (0.0, 0.0)]
+
+
+def test_steered_wheels_have_a_section_and_a_picture_of_their_own() -> None:
+    usual, steered = (DrivingReport(Options(runs=1, turning_radius_m=radius_m), ()) for radius_m in (0.0, 2.5))
+    assert (usual.section_name, steered.section_name) == ("driving", "driving-steered")
+    assert "--turning-radius 2.5" in steered.options.command("driving")
+    assert "--turning-radius" not in usual.options.command("driving")
+
+
+@pytest.mark.parametrize("arguments", [["gates"], ["driving", "--world", "map.map"]])
+def test_a_turning_radius_goes_with_random_grounds_alone(arguments: list[str]) -> None:
+    result = CliRunner().invoke(app, ["experiment", *arguments, "--turning-radius", "2.5"])
+    assert result.exit_code == 2 and result.output.startswith("--turning-radius: ")
+
+
+@pytest.mark.thorough
+def test_with_steered_wheels_it_comes_through_a_forest() -> None:
+    steered = drive("forest", "theta-star", 0, turning_radius_m=2.5)
+    assert steered.reached and steered.report.collisions == 0
+    assert steered.report.driving_time_s != drive("forest", "theta-star", 0).report.driving_time_s
 
 
 @pytest.mark.thorough

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 from companion.mission.load import load_mission
 from sitl.cli.commands import app
 from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, disc, empty
-from sitl.generators.kinds import KINDS, Forest, GroundKind, Maze, Rooms
-from sitl.generators.made_ground import BODY_M, MadeGround, NoWayError, made
-from sitl.generators.measures import difficulty
+from sitl.generators.kinds import KINDS, Forest, GroundKind, Maze, Rooms, Yard
+from sitl.generators.made_ground import MadeGround, NoWayError, made
+from sitl.generators.shortest_way import BODY_M
 from sitl.scenario import scenario_from_mission
 from sitl.world.world import World
 
@@ -37,10 +37,25 @@ def test_parameters_change_what_they_say() -> None:
     grounds = [made(GroundKind.FOREST, 1, Forest(per_100_m2=trees)).world.obstacles for trees in (2.0, 12.0)]
     few, many = (solid[1:-1, 1:-1].sum() for solid in grounds)
     assert many > 3 * few
-    wide, narrow = (difficulty(made(GroundKind.MAZE, 1, Maze(corridor_m=m))).characteristic_m for m in (5.0, 2.0))
+    wide, narrow = (made(GroundKind.MAZE, 1, Maze(corridor_m=m)).difficulty.characteristic_m for m in (5.0, 2.0))
     assert wide > 1.5 * narrow
     with pytest.raises(ValidationError, match=r"most_door_m 1.5 is less than least_door_m 3"):
         Rooms(least_door_m=3.0, most_door_m=1.5)
+
+
+def test_a_yard_has_a_house_and_hedges_where_they_are_asked_for_and_its_gates_stay() -> None:
+    plain = made(GroundKind.YARD, 0).world.obstacles
+    house = made(GroundKind.YARD, 0, Yard(house=1)).world.obstacles
+    norths, easts = np.nonzero(house & ~plain)
+    assert house[norths.min() : norths.max() + 1, easts.min() : easts.max() + 1].all(), "no door, and a container less"
+    assert (np.ptp(norths) + 1) * FINE_M == pytest.approx(8.0) and (np.ptp(easts) + 1) * FINE_M == pytest.approx(4.5)
+    hedged = made(GroundKind.YARD, 0, Yard(hedges=2, hedge_m=0.6)).world.obstacles
+    assert (hedged & ~plain).any(axis=0).sum() == 12, "columns of two hedges"
+    fences = np.flatnonzero(plain[1:-1, 1:-1].mean(axis=0) > 0.7) + 1
+    beside = [column for column in fences if (hedged & ~plain)[:, column + 1].any()]
+    assert len(beside) == 2
+    for column in beside:
+        assert np.array_equal(hedged[1:-1, column + 6], plain[1:-1, column]), "open where the fence is"
 
 
 def test_ground_without_a_way_is_not_looked_for_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -54,11 +69,20 @@ def test_the_measures_are_those_of_a_corridor() -> None:
     solid[: round(15.0 / FINE_M)] = True
     solid[round(17.0 / FINE_M) :] = True
     way_m = np.column_stack((np.full(150, 16.0), np.linspace(12.0, 32.0, 150)))
-    found = difficulty(MadeGround(GroundKind.MAZE, World(solid, FINE_M), (16.0, 12.0), (16.0, 32.0), way_m))
+    found = MadeGround(GroundKind.MAZE, World(solid, FINE_M), (16.0, 12.0), (16.0, 32.0), way_m).difficulty
     assert found.closest_wall_m == pytest.approx(1.0, abs=0.1)
     assert found.characteristic_m == pytest.approx(2.0, abs=0.2)
+    bearings = np.arange(16) * np.pi / 8.0
+    rays_m = np.minimum(8.0, 1.0 / np.maximum(np.abs(np.cos(bearings)), 1e-9))
+    assert found.visibility_m == pytest.approx(rays_m.mean(), abs=0.1), "1 m to both sides, 8 m ahead and behind"
     assert found.tortuosity == pytest.approx(1.0)
     assert found.dispersion == pytest.approx(4.0), "free ahead and behind, shut on both sides"
+
+
+def test_on_empty_ground_the_way_is_straight() -> None:
+    grounds = [made(GroundKind.FOREST, seed, Forest(per_100_m2=0.0)) for seed in range(4)]
+    assert max(abs(one.goal_m[0] - one.start_m[0]) for one in grounds) > 5.0, "not along a row of fields"
+    assert max(one.difficulty.tortuosity for one in grounds) < 1.005
 
 
 def test_a_disc_is_round_and_stays_on_the_ground() -> None:
