@@ -38,7 +38,7 @@ def broken(result: RunResult) -> tuple[Policy, ...]:
         Policy.NO_ERROR: result.outcome == ERROR,
         Policy.NO_CONTACT: result.touched > 0,
         Policy.NOTHING_REFUSED: result.refused > 0,
-        Policy.NO_FALSE_UNREACHABLE: result.unreachable > 0 and result.bound_s > 0.0,
+        Policy.NO_FALSE_UNREACHABLE: result.called_wrongly > 0,
         Policy.PILOT_WINS: result.against_pilot > 0,
         Policy.NOT_BLIND: result.blind_s > 0.0,
         Policy.ENDS: result.outcome == DriveOutcome.TIME_LIMIT and not result.waits_for,

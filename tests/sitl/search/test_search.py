@@ -101,8 +101,8 @@ def test_files_of_a_find_count_from_its_own_folder(tmp_path: Path) -> None:
         (Goal.STUCK, RunResult("points", "time limit", targets=1, bound_s=20.0), True),
         (Goal.STUCK, RunResult("points", "time limit", targets=1, bound_s=20.0, waits_for="a person"), False),
         (Goal.STUCK, RunResult("points", "time limit", targets=1, bound_s=0.0), False),
-        (Goal.UNREACHABLE, RunResult("points", "unreachable", unreachable=1, bound_s=20.0), True),
-        (Goal.UNREACHABLE, RunResult("points", "unreachable", unreachable=1), False),
+        (Goal.UNREACHABLE, RunResult("points", "incomplete", unreachable=1, called_wrongly=1), True),
+        (Goal.UNREACHABLE, RunResult("points", "incomplete", unreachable=1, bound_s=20.0), False),
         (Goal.REFUSED, RunResult("points", "reached", refused=1), True),
     ],
 )
