@@ -105,14 +105,13 @@ def _extent(scenario: Scenario, base: Grid, origin_m: Places, ends: Places) -> t
     world, corner = scenario.world, np.array([base.south_west.north_m, base.south_west.east_m]) + origin_m
     spanned = np.array([[world.south_m, world.west_m],
                         [world.south_m + world.height_m, world.west_m + world.width_m], *ends])  # fmt: skip
-    low: Places = np.maximum(spanned.min(axis=0) - ROUND_M, corner)
+    low = np.maximum(spanned.min(axis=0) - ROUND_M, corner)
     high = np.minimum(spanned.max(axis=0) + ROUND_M, corner + base.resolution_m * np.array([base.height, base.width]))
     return low, np.maximum(high - low, FINEST_M)
 
 
 def _middles(low: float, side_m: float, count: int) -> Places:
-    middles: Places = low + (np.arange(count) + 0.5) * side_m
-    return middles
+    return low + (np.arange(count, dtype=np.float64) + 0.5) * side_m
 
 
 def _solid(
