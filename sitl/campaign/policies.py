@@ -25,9 +25,9 @@ class Policy(StrEnum):
     NO_FALSE_UNREACHABLE = "unreachable-but-free"
     """A target is called unreachable only where no way leads for the rover."""
     PILOT_WINS = "against-pilot"
-    """No setpoint goes out while the mode is another one or the rover is disarmed, as far as was told."""
+    """Nothing that moves, arms or switches goes out while the mode is another one or it is disarmed, as was told."""
     NOT_BLIND = "blind"
-    """Without range data the rover is made to stand."""
+    """Without range data the rover is made to brake, and stands."""
     ENDS = "no-end"
     """A mission ends, or says what it waits for, within the time limit."""
 

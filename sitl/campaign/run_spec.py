@@ -81,9 +81,9 @@ class RunResult:
     clearance_m: float = 0.0
     """The least distance of its outline from anything while it moved, of all ticks; at most 5, 0 where it touched."""
     against_pilot: int = 0
-    """Setpoints that were sent while a person or a failsafe had the rover."""
+    """Setpoints, modes and arming that were sent while a person or a failsafe had the rover."""
     blind_s: float = 0.0
-    """So long it moved on without range data."""
+    """So long it moved on without range data and did not brake as it must."""
     waits_for: str = ""
     """What it waited for at its end; empty if it waited for nothing."""
     steps: int = 0
