@@ -74,9 +74,9 @@ class _Keeper:
         self._kept += 1
         what = f"{find.rule}: {find.base.world}, seed {find.base.seed}"
         if find.values:
-            typer.echo(f"{what}: {number_of(len(find.values), 'value')} differ; driven again with fewer", err=True)
+            typer.echo(f"{what}: driven again with less that differs", err=True)
         least, besides = minimised(
-            find, self._goal, self._drive, lambda one: typer.echo(f"{what}: {len(one.values)} are enough", err=True)
+            find, self._goal, self._drive, lambda one: typer.echo(f"{what}: {differences(one)}", err=True)
         )
         result, folder = least.result, self._place / "found"
         spec = counted_from(least.spec, self._file, folder)

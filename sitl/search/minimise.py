@@ -29,11 +29,15 @@ def minimised(find: Find, goal: Goal, drive: Driven, told: Told = lambda find: N
             fewer = {name: value for name, value in find.values.items() if name not in names}
             if len(fewer) == len(find.values):
                 continue
-            (result,) = drive([replace(find, values=fewer).spec])
+            tried = replace(find, values=fewer)
+            if tried.spec == find.spec:  # like the time of a fault that does not happen
+                find = tried
+                continue
+            (result,) = drive([tried.spec])
             shown = finds_in(goal, find.base, find.genes, fewer, result)
             besides += [one for one in shown if one.rule != find.rule]
             if find.again(result):
-                find = replace(find, values=fewer, result=result)
+                find = replace(tried, result=result)
                 told(find)
         if len(find.values) == before:
             return find, besides

@@ -110,6 +110,21 @@ def test_what_could_not_be_put_back_is_tried_again_when_something_else_has_gone(
     assert set(least.values) == {"dropout"} and left == [2, 1]
 
 
+def test_values_without_an_effect_are_put_back_without_a_drive() -> None:
+    """Like the time of a fault that does not happen."""
+    base, asked = first_bases(CAMPAIGN)[0], list[RunSpec]()
+    table = CAMPAIGN.model_copy(update={"search": SearchTable(parts=["faults"])})
+    values = {"wheel_slip.start_s": 12.0, "gps_loss.start_s": 3.0, "pilot.duration_s": 4.0}
+    find = Find(Policy.NO_CONTACT, base, genes_of(table, base), values, RunResult("points", "collision", touched=1))
+
+    def drive(specs: Sequence[RunSpec]) -> list[RunResult]:
+        asked.extend(specs)
+        return [RunResult("points", "collision", touched="pilot" in spec.faults) for spec in specs]
+
+    least, _ = minimised(find, Goal.STUCK, drive)
+    assert set(least.values) == {"pilot.duration_s"} and {spec.faults for spec in asked} == {"none"}
+
+
 def test_what_breaks_another_rule_on_the_way_is_a_find_too() -> None:
     def drive(specs: Sequence[RunSpec]) -> list[RunResult]:
         return [RunResult("points", "reached", 1, 1, refused="dropout" not in present(spec)) for spec in specs]
