@@ -16,7 +16,7 @@ STEP_M = 0.05
 RADII = 0.43
 """Where the rover keeps the circle round it clear, the middle of a field must lie in every gap that it should fit
 through. With fields of so many radii a rover of 0.7 m drives through 1.0 m."""
-MOST_FINE, MOST_FINE_PLANNED = 250_000, 1_000_000
+MOST_FINE, MOST_FINE_PLANNED = 250_000, 1_300_000
 """Fields that may be small are so large that there are no more of them: searches take time. The second is for planned
 motions, which search less often."""
 ARC_RADII = 0.72

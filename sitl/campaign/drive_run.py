@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from dataclasses import replace
 from functools import lru_cache
@@ -20,6 +21,7 @@ from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
+from sitl.campaign.true_ways import Verdicts
 from sitl.campaign.wire_watch import WireWatch
 from sitl.campaign.worded import NOTHING, OWN, GroundSpec, SensorSpec, faults_of
 from sitl.experiments.experiment import GUARD
@@ -29,7 +31,8 @@ from sitl.generators.made_ground import MadeGround, NoWayError, made
 from sitl.lockstep import Drive, TrackPoint
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
 from sitl.simulator import ROOM_REACH_M
-from sitl.world.truth import STOOD_M_S, SimStart
+from sitl.world.movers import Mover
+from sitl.world.truth import STOOD_M_S, SimStart, Truth
 
 NO_GROUND = "no-ground"
 """The outcome where a kind with these parameters gives no ground with a way."""
@@ -40,33 +43,68 @@ STREAM = 71
 GROUNDS = 4
 """So many are kept: a run drives on the ground of the run before, or on one from shortly before."""
 LOOK_S = 0.5
+MOST_OFF = 0.3
+"""Nobody knows how a rover brakes that is farther off its model."""
 LEAST_S = 1.0
 """Of the time in one metre square that is kept."""
 
 
 class Nearest:
-    """How near the rover has come to anything while it moved."""
+    """How near the rover has come to anything while it moved, looked at in every tick. Create it before the run.
 
-    def __init__(self) -> None:
-        self.clearance_m = ROOM_REACH_M
+    Room is worked out only where it may be less than before: it shrinks no faster than rover and things move.
+    """
 
-    def look(self, run: Drive) -> None:
-        """At this moment."""
-        if abs(run.simulator.truth.speed_m_s) > STOOD_M_S:
-            self.clearance_m = min(self.clearance_m, run.simulator.clearance_m)
+    def __init__(self, run: Drive) -> None:
+        self._least_m = ROOM_REACH_M
+        self._run, self._before = run, run.simulator.truth
+        self._room_m = 0.0
+        world, outline = run.simulator.world, run.simulator.outline
+        self._turned_m = 0.0 if outline.radius_m else outline.reach_m
+        self._moving_m_s = math.inf if world.doors else max((_fastest_m_s(one) for one in world.movers), default=0.0)
+        self._heard = run.clock.delivered
+        run.clock.delivered = self._look
+
+    @property
+    def clearance_m(self) -> float:
+        """So far; 0 where it has touched something."""
+        touched = any(not hit.was_run_into for hit in self._run.simulator.collisions)
+        return 0.0 if touched else self._least_m
+
+    def _look(self, time_s: float, data: bytes) -> None:
+        if self._heard is not None:
+            self._heard(time_s, data)
+        now = self._run.simulator.truth
+        if abs(now.speed_m_s) > STOOD_M_S and self._least_room_m(now) < self._least_m:
+            self._before, self._room_m = now, self._run.simulator.clearance_m
+            self._least_m = min(self._least_m, self._room_m)
+
+    def _least_room_m(self, now: Truth) -> float:
+        """It cannot be less, after the way since it was worked out."""
+        before = self._before
+        turned_rad = abs(math.remainder(now.heading_rad - before.heading_rad, 2.0 * math.pi))
+        way_m = math.hypot(now.north_m - before.north_m, now.east_m - before.east_m) + turned_rad * self._turned_m
+        return self._room_m - way_m - self._moving_m_s * (now.time_s - before.time_s)
+
+
+def _fastest_m_s(mover: Mover) -> float:
+    steps = np.diff(mover.track, axis=0)
+    return float((np.hypot(steps[:, 1], steps[:, 2]) / steps[:, 0]).max())
 
 
 def drive(spec: RunSpec, folder: Path) -> RunResult:
     """One run. ``folder``: that of the campaign's file. An error of the programs is a result, too."""
     began_s, targets = processor_s(), 0
     try:
-        run, near = prepared(spec, folder), Nearest()
+        run, verdicts = prepared(spec, folder), Verdicts()
         targets = len(run.mission.targets)
-        watch = WireWatch(run)
-        run.run(lambda status: near.look(run), LOOK_S)
+        watch, near = WireWatch(run), Nearest(run)
+        run.run(lambda status: verdicts.look(run), LOOK_S)
+        blind_s = watch.blind_s if spec.off_model <= MOST_OFF else 0.0
         ground = _ground_of(spec.world, spec.seed)
-        result = _result(run, near.clearance_m, watch, processor_s() - began_s)
-        return result if ground is None else replace(result, ground=ground.difficulty)
+        result = _result(run, near, watch.against_pilot, blind_s, verdicts.wrong(run))
+        difficulty = None if ground is None else ground.difficulty
+        return replace(result, cpu_s=round(processor_s() - began_s, 2), ground=difficulty)
     except NoWayError as error:
         return RunResult("", NO_GROUND, cpu_s=processor_s() - began_s, said=str(error)[:300])
     except Exception as error:
@@ -146,7 +184,7 @@ def _mission_across(ground: MadeGround) -> Mission:
     return Mission(f"{ground.kind}", (target,), GridSpec(margin_m=30.0, by_footprint=True), RoverSpec(), sitl=sitl)
 
 
-def _result(run: Drive, clearance_m: float, watch: WireWatch, cpu_s: float) -> RunResult:
+def _result(run: Drive, near: Nearest, against_pilot: int, blind_s: float, called_wrongly: int) -> RunResult:
     report, executor, hits = run.report, run.companion.executor, run.simulator.collisions
     run_into = sum(hit.was_run_into for hit in hits)
     statuses = Counter(status for _, status in report.targets)
@@ -159,18 +197,18 @@ def _result(run: Drive, clearance_m: float, watch: WireWatch, cpu_s: float) -> R
         run_into=run_into,
         refused=report.refused,
         unreachable=statuses[TargetStatus.UNREACHABLE],
+        called_wrongly=called_wrongly,
         seconds=round(report.driving_time_s, 2),
         bound_s=0.0 if executor is None else round(time_bound_s(run.mission, run.scenario, executor), 2),
         metres=round(report.distance_m, 2),
         drawn_ah=round(run.simulator.drawn_ah, 4),
-        clearance_m=round(clearance_m, 3),
-        against_pilot=watch.against_pilot,
-        blind_s=round(watch.blind_s, 2),
+        clearance_m=round(near.clearance_m, 3),
+        against_pilot=against_pilot,
+        blind_s=round(blind_s, 2),
         waits_for=_waits_for(run),
         steps=report.steps,
         searches=report.searches,
         genetic_searches=report.genetic_searches,
-        cpu_s=round(cpu_s, 2),
         said=report.said[-1][:300] if report.said else "",
         dwelt=_dwelt(report.track),
     )

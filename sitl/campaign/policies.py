@@ -25,9 +25,9 @@ class Policy(StrEnum):
     NO_FALSE_UNREACHABLE = "unreachable-but-free"
     """A target is called unreachable only where no way leads for the rover."""
     PILOT_WINS = "against-pilot"
-    """No setpoint goes out while the mode is another one or the rover is disarmed, as far as was told."""
+    """Nothing that moves, arms or switches goes out while the mode is another one or it is disarmed, as was told."""
     NOT_BLIND = "blind"
-    """Without range data the rover is made to stand."""
+    """Without range data the rover is made to brake, and stands."""
     ENDS = "no-end"
     """A mission ends, or says what it waits for, within the time limit."""
 
@@ -38,7 +38,7 @@ def broken(result: RunResult) -> tuple[Policy, ...]:
         Policy.NO_ERROR: result.outcome == ERROR,
         Policy.NO_CONTACT: result.touched > 0,
         Policy.NOTHING_REFUSED: result.refused > 0,
-        Policy.NO_FALSE_UNREACHABLE: result.unreachable > 0 and result.bound_s > 0.0,
+        Policy.NO_FALSE_UNREACHABLE: result.called_wrongly > 0,
         Policy.PILOT_WINS: result.against_pilot > 0,
         Policy.NOT_BLIND: result.blind_s > 0.0,
         Policy.ENDS: result.outcome == DriveOutcome.TIME_LIMIT and not result.waits_for,

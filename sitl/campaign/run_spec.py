@@ -70,6 +70,8 @@ class RunResult:
     """Setpoints that the last look replaced by a stop."""
     unreachable: int = 0
     """Targets that were called unreachable."""
+    called_wrongly: int = 0
+    """Those of them to which a way leads (``true_ways``)."""
     seconds: float = 0.0
     """Driving time, from the first movement to the last."""
     bound_s: float = 0.0
@@ -78,11 +80,11 @@ class RunResult:
     drawn_ah: float = 0.0
     """Drawn from the battery."""
     clearance_m: float = 0.0
-    """The least distance of its outline from anything while it moved, looked at twice a second; at most 5."""
+    """The least distance of its outline from anything while it moved, of all ticks; at most 5, 0 where it touched."""
     against_pilot: int = 0
-    """Setpoints that were sent while a person or a failsafe had the rover."""
+    """Setpoints, modes and arming that were sent while a person or a failsafe had the rover."""
     blind_s: float = 0.0
-    """So long it moved on without range data."""
+    """So long it moved on without range data and did not brake as it must."""
     waits_for: str = ""
     """What it waited for at its end; empty if it waited for nothing."""
     steps: int = 0

@@ -7,25 +7,39 @@ Nouns: wire watch.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sitl.autopilot.parameters import DEFAULTS
+from sitl.campaign.range_bytes import RANGES, tells_ahead
+from sitl.faults.plan import LinkEffect, LinkFault
 from sitl.lockstep import Drive
 from sitl.sim_link import HEAD_BYTES, MAGIC_2, packet_bytes
 
 GUIDED, AUTO, ARMED = 15, 10, 128
 AUTOPILOT = 1
 HEARTBEAT = 0
-RANGES = (132, 330, 11037)
-"""DISTANCE_SENSOR, OBSTACLE_DISTANCE, OBSTACLE_DISTANCE_3D."""
-SETPOINTS = (84, 86, 73)
-"""SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT, MISSION_ITEM_INT."""
-COMMAND_INT, REPOSITION = 75, 192
+LEG = 86
+"""SET_POSITION_TARGET_GLOBAL_INT of the autopilot: a leg of AUTO is handed over, and it says so every second."""
+LEG_S = 3.5
+"""Two of these messages may be lost, and a heartbeat may follow a second later."""
+DRIVES = (84, 86, 73, 82, 70, 69)
+"""SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT, MISSION_ITEM_INT, SET_ATTITUDE_TARGET,
+RC_CHANNELS_OVERRIDE, MANUAL_CONTROL."""
+SET_MODE = 11
+COMMANDS = (75, 76)
+"""COMMAND_INT, COMMAND_LONG."""
+REPOSITION, DO_SET_MODE, ARM = 192, 176, 400
 COMMAND_AT = slice(38, 40)
-"""The bytes of a COMMAND_INT with the command's number."""
-STOPPING_S = 4.0
-"""From the moment at which range data counts as stale: a tick, the line, and braking from 2 m/s."""
+"""The bytes of both with the command's number."""
+REACTS_S = 0.5
+"""A tick, and until motors and wheels follow; the link's delay comes on top, each way."""
+LOSSY_S = 1.0
+"""More, where a fault plan loses packets: a stop is sent five times a second."""
+BRAKES = 0.7
+"""The least share of the autopilot's limit with which a rover brakes that has been told to."""
 ALIVE_S = 0.5
 """A line over which nothing comes for longer may be cut: then the companion cannot stop the rover."""
 MOVES_M_S = 0.1
@@ -36,13 +50,24 @@ class WireWatch:
 
     def __init__(self, run: Drive) -> None:
         self.against_pilot = 0
-        """Setpoints that were sent though the last heartbeat had told another mode than GUIDED, or disarmed."""
+        """What was sent to move the rover, to set its mode or to arm it though a person or a failsafe had it.
+
+        So the last heartbeat had told another mode than GUIDED, or disarmed. Before the rover was in GUIDED for the
+        first time the companion may set it, and arm once.
+        """
         self.blind_s = 0.0
-        """So long the rover moved on without range data."""
+        """So long the rover moved on without range data though it should have braked, or have stood."""
         self._run = run
         self._stale_s = run.settings.safety.stale_s
+        self._reacts_s = REACTS_S + _delay_s(run)
+        limits = run.scenario.parameters
+        usual_m_s2 = limits.get("ATC_ACCEL_MAX", DEFAULTS["ATC_ACCEL_MAX"][0])
+        self._brakes_m_s2 = BRAKES * (limits.get("ATC_DECEL_MAX", 0.0) or usual_m_s2)
         self._may_send = True
-        self._last_s = self._ranges_s = self._line_s = 0.0
+        self._mode: int | None = None
+        self._was_guided = self._was_armed = False
+        self._last_s = self._ranges_s = self._line_s = self._since_s = self._fastest_m_s = 0.0
+        self._leg_s = -math.inf
         self._mav = mavlink.MAVLink(None)
         self._mav.robust_parsing = True
         run.clock.overhear = self._said
@@ -51,40 +76,65 @@ class WireWatch:
     def _said(self, time_s: float, data: bytes) -> None:
         """``data``: of the companion."""
         if not self._may_send:
-            self.against_pilot += sum(_is_setpoint(kind, packet) for kind, packet in _packets(data))
+            self.against_pilot += sum(self._is_against(kind, packet) for kind, packet in _packets(data))
+
+    def _is_against(self, kind: int, packet: bytes) -> bool:
+        """Setpoints in every form that ``link.setpoint`` may choose; modes and arming once it was the companion's."""
+        command = int.from_bytes(packet[COMMAND_AT], "little") if kind in COMMANDS else 0
+        if kind == SET_MODE or command == DO_SET_MODE:
+            return self._was_guided and self._mode != GUIDED
+        return kind in DRIVES or command == REPOSITION or (command == ARM and self._was_armed)
 
     def _heard(self, time_s: float, data: bytes) -> None:
         """``data``: delivered to the companion."""
+        cut = time_s - self._line_s >= ALIVE_S
         for kind, packet in _packets(data):
             if kind in RANGES:
-                self._ranges_s = time_s
+                if tells_ahead(kind, packet):
+                    self._ranges_s = time_s
             elif kind == HEARTBEAT:
-                self._take_mode(packet)
+                self._take_mode(packet, time_s)
+            elif kind == LEG:
+                self._leg_s = time_s
+        if cut or not self._may_send:
+            self._since_s = time_s  # the companion cannot stop the rover, or must not
         if data:
             self._line_s = time_s
-        if self._ranges_s and self._moves_blind(time_s):
+        if self._ranges_s and self._moves_blind(time_s - max(self._ranges_s, self._since_s)):
             self.blind_s += time_s - self._last_s
         self._last_s = time_s
 
-    def _take_mode(self, packet: bytes) -> None:
+    def _take_mode(self, packet: bytes, time_s: float) -> None:
         for beat in self._mav.parse_buffer(packet) or []:
             if beat.get_type() == "HEARTBEAT" and beat.get_srcComponent() == AUTOPILOT:
-                self._may_send = beat.custom_mode in (GUIDED, AUTO) and bool(beat.base_mode & ARMED)
+                self._mode, armed = beat.custom_mode, bool(beat.base_mode & ARMED)
+                leg = self._run.mission.in_auto and self._mode == AUTO and time_s - self._leg_s <= LEG_S
+                self._may_send = armed and (self._mode == GUIDED or leg)
+                self._was_guided |= self._mode == GUIDED
+                self._was_armed |= self._may_send
 
-    def _moves_blind(self, time_s: float) -> bool:
-        silent_s = time_s - self._ranges_s
-        return (
-            silent_s > self._stale_s + STOPPING_S
-            and time_s - self._line_s < ALIVE_S
-            and self._may_send
-            and abs(self._run.simulator.truth.speed_m_s) > MOVES_M_S
-        )
+    def _moves_blind(self, silent_s: float) -> bool:
+        """Whether it is faster than a rover that brakes once it has had time to react.
+
+        ``silent_s``: so long there was no range data, and the companion could have stopped the rover.
+        """
+        if silent_s <= self._stale_s:
+            self._fastest_m_s = 0.0
+            return False
+        speed_m_s, braked_s = abs(self._run.simulator.truth.speed_m_s), silent_s - self._stale_s - self._reacts_s
+        if braked_s <= 0.0:
+            self._fastest_m_s = max(self._fastest_m_s, speed_m_s)
+            return False
+        return speed_m_s > max(self._fastest_m_s - self._brakes_m_s2 * braked_s, MOVES_M_S)
 
 
-def _is_setpoint(kind: int, packet: bytes) -> bool:
-    """In every form that ``link.setpoint`` may choose."""
-    command = int.from_bytes(packet[COMMAND_AT], "little") if kind == COMMAND_INT else 0
-    return kind in SETPOINTS or command == REPOSITION
+def _delay_s(run: Drive) -> float:
+    """How much later the companion hears of it, and is heard: by the link, and by the fault plan."""
+    faults = () if run.scenario.faults is None else run.scenario.faults.faults
+    of_link = [fault for fault in faults if isinstance(fault, LinkFault)]
+    late_s = math.fsum(fault.delay_s + fault.jitter_s for fault in of_link)
+    lossy = any(fault.effect in (LinkEffect.LOSS, LinkEffect.CORRUPT) for fault in of_link)
+    return 2.0 * (run.late_s + late_s) + (LOSSY_S if lossy else 0.0)
 
 
 def _packets(data: bytes) -> Iterator[tuple[int, bytes]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -34,6 +35,12 @@ from sitl.search.goals import Goal
 BAD_INPUT = (CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError, NoWayError)
 EXIT_FAILED = 3
 BUDGET = 1000
+APART = {
+    "--search": ("--cluster", "--parquet", "--replay", "--record"),
+    "--replay": ("--cluster", "--parquet", "--jobs", "--out"),
+    "--cluster": ("--jobs",),
+}
+"""Options that do not go together."""
 
 
 def campaign(
@@ -60,7 +67,9 @@ def campaign(
     ] = None,
     budget: Annotated[
         int | None,
-        typer.Option(min=1, help="With --search: so many runs, and some more to make finds small; default: 1000."),
+        typer.Option(
+            min=1, help="With --search: so many runs; those that make finds small come on top. Default: 1000."
+        ),
     ] = None,
     parquet: Annotated[
         bool, typer.Option("--parquet", help=f"Write {PARQUET}, too (needs the extra parquet).")
@@ -71,8 +80,18 @@ def campaign(
     Exit code 2: bad input; 3: a run ended with an error of the programs; 130: stopped, what is done is kept.
     """
     try:
-        if budget is not None and search is None:
-            raise CampaignError("--budget goes with --search")
+        _check_together(
+            {
+                "--search": search is not None,
+                "--budget": budget is not None,
+                "--cluster": cluster is not None,
+                "--replay": replay is not None,
+                "--record": record is not None,
+                "--parquet": parquet,
+                "--jobs": jobs > 1,
+                "--out": out is not None,
+            }
+        )
         if replay is not None or record is not None:
             _drive_again(file, replay, record)
         elif search is not None:
@@ -82,6 +101,16 @@ def campaign(
     except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
+
+
+def _check_together(given: Mapping[str, bool]) -> None:
+    """Raises CampaignError for options of which one would be without effect."""
+    if given["--budget"] and not given["--search"]:
+        raise CampaignError("--budget goes with --search")
+    for one, others in APART.items():
+        for other in others:
+            if given[one] and given[other]:
+                raise CampaignError(f"{one} and {other} do not go together; leave one of them out")
 
 
 def drive_campaign(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import typer
@@ -20,8 +22,8 @@ from sitl.search.goals import Goal
 from sitl.search.minimise import minimised
 from sitl.search.search import Find, first_bases, searched
 
-MOST_MINIMISED = 20
-"""Finds of one combination and rule are alike; the first of each are made as small as can be, at most so many."""
+MOST_KEPT = 20
+"""Finds of one rule and combination are alike: the first is made small and written. No more than so many are."""
 
 
 class _Driver:
@@ -29,13 +31,65 @@ class _Driver:
 
     def __init__(self, store: RunStore, digests: Digests, jobs: int) -> None:
         self._store, self._digests, self._jobs = store, digests, jobs
+        self.ended: Callable[[int], None] = lambda more: None
+        """Called with 0 when a run has ended."""
 
     def __call__(self, specs: Sequence[RunSpec]) -> list[RunResult]:
         left = list({spec.id: spec for spec in specs if spec.id not in self._store.results}.values())
         for spec, result in driven_here(left, self._digests, self._jobs if len(left) > 1 else 1):
             with written(self._store.file):
                 self._store.add(spec, result)
+            self.ended(0)
         return [self._store.results[spec.id] for spec in specs]
+
+
+class _Keeper:
+    """Makes the first find of each rule and combination small, and writes it at once."""
+
+    def __init__(self, file: Path, goal: Goal, place: Path, drive: _Driver) -> None:
+        self._file, self._goal, self._place, self._drive = file, goal, place, drive
+        self._kinds: set[tuple[str, str]] = set()
+        self._kept = self._wrong = 0
+
+    def take(self, found: Sequence[Find]) -> None:
+        """Finds of the search. What goes wrong besides while one is made small is one more."""
+        waiting = deque(found)
+        while waiting:
+            find = waiting.popleft()
+            self._wrong += 1
+            kind = find.rule.value, replace(find.base, seed=0).id
+            if kind not in self._kinds:
+                self._kinds.add(kind)
+                if self._kept < MOST_KEPT:
+                    waiting += self._keep(find)
+
+    def sum_up(self) -> None:
+        """The last line."""
+        left_out = len(self._kinds) - self._kept
+        more = f"; no more than {MOST_KEPT} are made small, {left_out} were left out" if left_out else ""
+        told = f"{number_of(self._wrong, 'find')} of {number_of(len(self._kinds), 'kind')}{more}"
+        typer.echo(told if self._wrong else "no run went wrong")
+
+    def _keep(self, find: Find) -> list[Find]:
+        self._kept += 1
+        what = f"{find.rule}: {find.base.world}, seed {find.base.seed}"
+        if find.values:
+            typer.echo(f"{what}: driven again with less that differs", err=True)
+        least, besides = minimised(
+            find, self._goal, self._drive, lambda one: typer.echo(f"{what}: {differences(one)}", err=True)
+        )
+        result, folder = least.result, self._place / "found"
+        spec = counted_from(least.spec, self._file, folder)
+        target = folder / f"{least.rule}-{spec.id}.toml"
+        with written(target):
+            write_find(least, spec, target, f"rover-sitl campaign {self._file.name} --search {self._goal}")
+        typer.echo(
+            f"{least.rule}: {least.spec.world}, seed {spec.seed}, {result.led_by or spec.controller}: "
+            f"{result.outcome}, touched {result.touched}, closest {result.clearance_m:g} m"
+        )
+        typer.echo(f"  differs: {differences(least)}")
+        typer.echo(f"  again: rover-sitl campaign {target} --replay {spec.id} --record out/run")
+        return besides
 
 
 def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs: int) -> None:
@@ -49,41 +103,15 @@ def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs:
         bases = first_bases(table)
         check_all(bases, folder)
         warm_up_all(bases, folder)
-        drive, finds = _Driver(store, digests, jobs), list[Find]()
-        before = len(store.results)
+        drive = _Driver(store, digests, jobs)
+        keeper, before = _Keeper(file, goal, place, drive), len(store.results)
         try:
             with progress(console, budget) as advance:
+                drive.ended = advance
                 for found, driven in searched(table, goal, budget, drive):
-                    finds += found
                     advance(driven)
-            least = [minimised(find, drive) for find in _of_each_kind(finds)]
+                    keeper.take(found)
         except KeyboardInterrupt:
             kept = len(store.results) - before
             raise StoppedError(f"{number_of(kept, 'run')}, kept in {store.file}; the same command goes on") from None
-        _put_out(least, finds, file, goal, place)
-
-
-def _of_each_kind(finds: Sequence[Find]) -> list[Find]:
-    """The first of each rule and combination."""
-    kinds: dict[tuple[object, ...], Find] = {}
-    for find in finds:
-        base = find.base
-        kinds.setdefault((find.rule, base.world, base.planner, base.controller, base.sensors, base.guard), find)
-    return list(kinds.values())[:MOST_MINIMISED]
-
-
-def _put_out(least: Sequence[Find], finds: Sequence[Find], file: Path, goal: Goal, place: Path) -> None:
-    for find in least:
-        result, folder = find.result, place / "found"
-        spec = counted_from(find.spec, file, folder)
-        target = folder / f"{find.rule}-{spec.id}.toml"
-        with written(target):
-            write_find(find, spec, target, f"rover-sitl campaign {file.name} --search {goal}")
-        typer.echo(
-            f"{find.rule}: {find.spec.world}, seed {spec.seed}, {result.led_by or spec.controller}: {result.outcome}, "
-            f"touched {result.touched}, closest {result.clearance_m:g} m"
-        )
-        typer.echo(f"  differs: {differences(find)}")
-        typer.echo(f"  again: rover-sitl campaign {target} --replay {spec.id} --record out/run")
-    told = f"{number_of(len(finds), 'run')} went wrong, of {number_of(len(least), 'kind')}"
-    typer.echo(told if finds else "no run went wrong")
+        keeper.sum_up()

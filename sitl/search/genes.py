@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from annotated_types import Ge, Le
@@ -41,10 +41,12 @@ class Gene:
     high: float
     usual: float
     whole: bool = False
+    rarely: float = 0.0
+    """Up to this share it is ``low``."""
 
     def value(self, share: float) -> float:
         """Of a share from 0 (``low``) to 1 (``high``)."""
-        share = min(max(share, 0.0), 1.0)
+        share = (min(max(share, self.rarely), 1.0) - self.rarely) / (1.0 - self.rarely)
         if self._by_logarithm:
             value = self.low * float((self.high / self.low) ** share)
         else:
@@ -56,9 +58,13 @@ class Gene:
     def share(self, value: float) -> float:
         """The reverse of ``value``."""
         value = min(max(value, self.low), self.high)
+        if value == self.low:
+            return 0.0
         if self._by_logarithm:
-            return math.log(value / self.low) / math.log(self.high / self.low)
-        return (value - self.low) / (self.high - self.low)
+            share = math.log(value / self.low) / math.log(self.high / self.low)
+        else:
+            share = (value - self.low) / (self.high - self.low)
+        return self.rarely + (1.0 - self.rarely) * share
 
     @property
     def _by_logarithm(self) -> bool:
@@ -74,15 +80,54 @@ SENSORS = (
     Gene(SearchPart.SENSORS, "latency_s", 0.0, 0.2, 0.0),
     Gene(SearchPart.SENSORS, "max_m", 3.0, 12.0, 8.0),
 )
-FAULTS: dict[str, dict[str, tuple[float, float]]] = {
-    "link_outage": {"start_s": (0.0, 60.0), "duration_s": (0.1, 3.0)},
-    "sensor_silent": {"start_s": (0.0, 60.0), "duration_s": (0.1, 3.0)},
-    "wheel_slip": {"start_s": (0.0, 60.0), "duration_s": (0.5, 10.0), "share": (0.05, 0.6)},
-    "gps_noise": {"start_s": (0.0, 60.0), "duration_s": (1.0, 30.0), "metres": (0.02, 0.25)},
+STARTS_S = (0.0, 60.0)
+"""From when the rover begins to drive."""
+RARELY = 0.5
+"""Up to this share a fault does not happen: with all kinds at once no run would show anything."""
+
+
+@dataclass(frozen=True, slots=True)
+class MovedFault:
+    """A kind of fault with the bounds of its keys.
+
+    ``harm``: the key without which there is none. ``fixed``: further words of docs/faults.md.
+    """
+
+    harm: str
+    bounds: Mapping[str, tuple[float, float]]
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def keys(self) -> dict[str, tuple[float, float]]:
+        """All bounds."""
+        return {"start_s": STARTS_S, **self.bounds}
+
+
+FAULTS = {
+    "link_outage": MovedFault("duration_s", {"duration_s": (0.1, 10.0)}),
+    "packet_loss": MovedFault("probability", {"duration_s": (1.0, 30.0), "probability": (0.02, 0.3)}),
+    "packet_delay": MovedFault("delay_s", {"duration_s": (1.0, 30.0), "delay_s": (0.02, 1.0), "jitter_s": (0.0, 0.5)}),
+    "packet_reorder": MovedFault("probability", {"duration_s": (1.0, 30.0), "probability": (0.02, 0.3)}),
+    "packet_duplicate": MovedFault("probability", {"duration_s": (1.0, 30.0), "probability": (0.02, 1.0)}),
+    "packet_corrupt": MovedFault("probability", {"duration_s": (1.0, 30.0), "probability": (0.02, 0.3)}),
+    "autopilot_reboot": MovedFault("duration_s", {"duration_s": (0.5, 5.0)}),
+    "pilot": MovedFault("duration_s", {"duration_s": (0.2, 20.0)}, {"mode": "HOLD"}),
+    "gps_loss": MovedFault("duration_s", {"duration_s": (0.5, 15.0)}),
+    "gps_glitch": MovedFault("metres", {"duration_s": (0.5, 15.0), "metres": (0.2, 20.0), "bearing_deg": (0.0, 360.0)}),
+    "gps_noise": MovedFault("metres", {"duration_s": (1.0, 30.0), "metres": (0.02, 0.25)}),
+    "gps_fix": MovedFault(
+        "metres",
+        {"duration_s": (1.0, 30.0), "metres": (0.05, 1.5), "bearing_deg": (0.0, 360.0)},
+        {"fix": "rtk-float"},
+    ),
+    "sensor_silent": MovedFault("duration_s", {"duration_s": (0.1, 10.0)}),
+    "sensor_stuck": MovedFault("duration_s", {"duration_s": (0.1, 10.0)}, {"in_view": True}),
+    "wheel_slip": MovedFault("share", {"duration_s": (0.5, 10.0), "share": (0.05, 0.6)}),
+    "battery_low": MovedFault("volts", {"duration_s": (1.0, 30.0), "volts": (9.0, 12.0)}),
 }
-"""Kinds of faults with the bounds of their keys; times count from when the rover begins to drive."""
-HARM = {"link_outage": "duration_s", "sensor_silent": "duration_s", "wheel_slip": "share", "gps_noise": "metres"}
-"""The key of a fault without which there is none."""
+"""The others need what a campaign's runs do not have: lidars on serial lines, commands, a gate for the GPS fix."""
+SETTINGS = {"guidance.look_ahead_m": (0.3, 2.0), "guidance.overshoot_m": (0.05, 1.0)}
+"""Beside those that a ground station may change: docs/settings.md gives them no upper bounds."""
 
 
 def genes_of(campaign: CampaignTable, base: RunSpec) -> tuple[Gene, ...]:
@@ -124,16 +169,16 @@ def _of_ground(world: str) -> tuple[Gene, ...]:
     if ground is None:
         return ()
     genes = []
-    for name, field in parameters_of(ground.kind).model_fields.items():
-        lows = [float(one.ge) for one in field.metadata if isinstance(one, Ge)]  # type: ignore[arg-type]
-        highs = [float(one.le) for one in field.metadata if isinstance(one, Le)]  # type: ignore[arg-type]
+    for name, one in parameters_of(ground.kind).model_fields.items():
+        lows = [float(bound.ge) for bound in one.metadata if isinstance(bound, Ge)]  # type: ignore[arg-type]
+        highs = [float(bound.le) for bound in one.metadata if isinstance(bound, Le)]  # type: ignore[arg-type]
         if not lows or not highs:
             continue  # one's own, without bounds
         low, high = lows[0], highs[0]
         usual = float(getattr(ground.given, name))
         if usual > 0.0:  # far from the usual most grounds have no way
             low, high = max(low, usual / WORLD_FACTOR), min(high, usual * WORLD_FACTOR)
-        genes.append(Gene(SearchPart.WORLD, name, low, high, usual, whole=field.annotation is int))
+        genes.append(Gene(SearchPart.WORLD, name, low, high, usual, whole=one.annotation is int))
     return tuple(genes)
 
 
@@ -149,17 +194,17 @@ def _of_sensors(sensors: str) -> tuple[Gene, ...]:
 
 def _of_faults() -> tuple[Gene, ...]:
     return tuple(
-        Gene(SearchPart.FAULTS, f"{kind}.{key}", low, high, low)
-        for kind, keys in FAULTS.items()
-        for key, (low, high) in keys.items()
+        Gene(SearchPart.FAULTS, f"{kind}.{key}", low, high, low, rarely=RARELY if key == one.harm else 0.0)
+        for kind, one in FAULTS.items()
+        for key, (low, high) in one.keys.items()
     )
 
 
 def _of_settings(campaign: CampaignTable, base: RunSpec) -> tuple[Gene, ...]:
-    """Those that ground stations may change, within their bounds, and the campaign's own."""
+    """Those that ground stations may change, within their bounds, ``SETTINGS``, and the campaign's own."""
     settings, changes = Settings(), json.loads(base.changes)
     bounds = {f"{one.section}.{one.key}": (one.low, one.high, one.whole) for one in TABLE}
-    for name, (low, high) in campaign.search.settings.items():
+    for name, (low, high) in {**SETTINGS, **campaign.search.settings}.items():
         bounds[name] = (low, high, isinstance(_setting(settings, name), int))
     genes = []
     for name, (low, high, whole) in bounds.items():
@@ -181,8 +226,8 @@ def _more(text: str, values: Values) -> str:
 
 def _faults_in_words(base: str, values: Values) -> str:
     pieces = [] if base == NOTHING else [base]
-    for kind, keys in FAULTS.items():
-        if f"{kind}.{HARM[kind]}" in values:
-            given = {key: values.get(f"{kind}.{key}", bounds[0]) for key, bounds in keys.items()}
-            pieces.append(str(Worded(kind, {**given, "since": "driving"})))
+    for kind, one in FAULTS.items():
+        if f"{kind}.{one.harm}" in values:
+            given = {key: values.get(f"{kind}.{key}", bounds[0]) for key, bounds in one.keys.items()}
+            pieces.append(str(Worded(kind, {**given, **one.fixed, "since": "driving"})))
     return f"{BETWEEN_FAULTS} ".join(pieces) or NOTHING

@@ -56,17 +56,17 @@ class Find:
 
 
 def searched(campaign: CampaignTable, goal: Goal, budget: int, drive: Driven) -> Iterator[tuple[list[Find], int]]:
-    """What each generation has found, and how many runs it was, until ``budget`` runs are driven.
+    """What each generation has found, and how many runs it was, until ``budget`` runs are driven and no more.
 
     Raises CampaignError if ``cma`` is not installed.
     """
     left = budget
     for number, base in enumerate(_bases(campaign)):
-        for found, driven in _one_start(campaign, goal, base, number, drive):
+        for found, driven in _one_start(campaign, goal, base, number, drive, left):
             left -= driven
             yield found, driven
-            if left <= 0:
-                return
+        if left <= 0:
+            return
 
 
 def first_bases(campaign: CampaignTable) -> list[RunSpec]:
@@ -81,9 +81,9 @@ def _bases(campaign: CampaignTable) -> Iterator[RunSpec]:
 
 
 def _one_start(
-    campaign: CampaignTable, goal: Goal, base: RunSpec, number: int, drive: Driven
+    campaign: CampaignTable, goal: Goal, base: RunSpec, number: int, drive: Driven, left: int
 ) -> Iterator[tuple[list[Find], int]]:
-    """Finds and number of runs of each generation."""
+    """Finds and number of runs of each generation; the last one is cut off where no more than ``left`` are left."""
     genes = genes_of(campaign, base)
     optimiser = _optimiser(genes, base, number)
     for _ in range(GENERATIONS):
@@ -91,17 +91,21 @@ def _one_start(
         values = [_values(genes, shares) for shares in asked]
         specs = [spec_with(base, genes, one) for one in values]
         possible = [spec for spec in specs if _is_possible(spec)]
-        results = dict(zip((spec.id for spec in possible), drive(possible), strict=True))
+        driven = possible[:left]
+        results = dict(zip((spec.id for spec in driven), drive(driven), strict=True))
         told = [results.get(spec.id) for spec in specs]
-        optimiser.tell(asked, [_distance(goal, result) for result in told])
         pairs = [(one, result) for one, result in zip(values, told, strict=True) if result is not None]
-        found = [find for one, result in pairs for find in _finds(goal, base, genes, one, result)]
-        yield found, max(len(possible), 1)
-        if any(find.rule == goal for find in found) or optimiser.stop():
+        found = [find for one, result in pairs for find in finds_in(goal, base, genes, one, result)]
+        left -= max(len(driven), 1)  # a generation without any run that can be driven must not go on for ever
+        yield found, max(len(driven), 1)
+        if left <= 0 or any(find.rule == goal for find in found):
+            return
+        optimiser.tell(asked, [_distance(goal, result) for result in told])
+        if optimiser.stop():
             return
 
 
-def _finds(goal: Goal, base: RunSpec, genes: tuple[Gene, ...], values: Values, result: RunResult) -> list[Find]:
+def finds_in(goal: Goal, base: RunSpec, genes: tuple[Gene, ...], values: Values, result: RunResult) -> list[Find]:
     """By what a run has done: the goal of the search, and all policies that it breaks."""
     rules: list[Goal | Policy] = [goal] if shows(goal, result) else []
     rules += [policy for policy in broken(result) if policy is not TOLD_TWICE.get(goal)]

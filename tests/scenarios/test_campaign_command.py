@@ -110,6 +110,12 @@ def test_what_is_done_is_not_done_again_and_a_run_can_be_driven_again(
         (["missing.toml"], "missing.toml: cannot be read"),
         (["short.toml", "--replay", "abc"], "--replay ID and --record FOLDER go together"),
         (["short.toml", "--budget", "5"], "--budget goes with --search"),
+        (["short.toml", "--search", "stuck", "--cluster", "tcp://h:1"], "--search and --cluster do not go together"),
+        (["short.toml", "--search", "stuck", "--parquet"], "--search and --parquet do not go together"),
+        (["short.toml", "--search", "stuck", "--replay", "abc"], "--search and --replay do not go together"),
+        (["short.toml", "--search", "stuck", "--record", "r"], "--search and --record do not go together"),
+        (["short.toml", "--replay", "abc", "--record", "r", "--out", "o"], "--replay and --out do not go together"),
+        (["short.toml", "--cluster", "tcp://h:1", "--jobs", "2"], "--cluster and --jobs do not go together"),
         (["short.toml", "--replay", "abc", "--record", "r"], "no run of this campaign"),
         (["short.toml", "--out", "/proc/none"], "cannot be written"),
         (["short.toml", "--cluster", "tcp://127.0.0.1:1"], "nobody answers there"),
@@ -162,7 +168,7 @@ def test_a_search_finds_makes_small_and_writes_what_drives_the_same_again(tmp_pa
     assert told[-4].startswith("collision: behind.toml, seed 0, points: collision, touched")
     assert told[-3] == "  differs: nothing"
     assert told[-2] == f"  again: rover-sitl campaign {found} --replay {found.stem[-12:]} --record out/run"
-    assert told[-1].endswith("runs went wrong, of 1 kind")
+    assert told[-1].endswith(" of 1 kind")
     number = len(lines_of(out / "search-collision"))
 
     again = CliRunner().invoke(app, command, env={"COLUMNS": "200"})

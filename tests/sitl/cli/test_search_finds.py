@@ -1,0 +1,71 @@
+"""Finds of a search are on the disk as soon as they are made small; a stop on the way loses none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from companion.cli.entry import StoppedError
+from sitl.campaign.run_spec import RunResult, RunSpec
+from sitl.cli import search
+from sitl.search.goals import Goal
+
+
+class Drives:
+    """Made-up runs: all touch something, and those without a latency refuse a setpoint, too."""
+
+    def __init__(self, stop_at: int) -> None:
+        self.number, self.stop_at = 0, stop_at
+
+    def __call__(self, specs: Sequence[RunSpec], digests: object, jobs: int) -> Iterator[tuple[RunSpec, RunResult]]:
+        for spec in specs:
+            self.number += 1
+            if self.number == self.stop_at:
+                raise KeyboardInterrupt
+            refused = "latency_s" not in spec.sensors
+            yield spec, RunResult("points", "collision", 0, 1, touched=1, refused=refused, seconds=9.0)
+
+
+@pytest.fixture
+def campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name in ("check_all", "warm_up_all"):
+        monkeypatch.setattr(search, name, lambda specs, folder: None)
+    file = tmp_path / "c.toml"
+    file.write_text('worlds = ["cylinders", "yard"]\n[search]\nparts = ["sensors"]\n')
+    return file
+
+
+def found(file: Path) -> list[str]:
+    return sorted(one.name.rpartition("-")[0] for one in (file.parent / "out").glob("search-*/found/*.toml"))
+
+
+def test_each_kind_of_find_is_made_small_and_written_once(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(search, "driven_here", Drives(10_000))
+    search.search_campaign(campaign, Goal.COLLISION, 40, campaign.parent / "out", 1)
+    assert found(campaign) == ["collision"] * 2 + ["refused"] * 2, "also what was found while making small"
+    said = capsys.readouterr()
+    assert said.out.splitlines()[-1].endswith(" finds of 4 kinds")
+    assert "collision: cylinders, seed 0: driven again with less that differs" in said.err
+    assert "collision: cylinders, seed 0: nothing" in said.err, "as far as it is"
+
+
+def test_a_stop_after_the_first_find_leaves_it_written(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were written at the very end."""
+    monkeypatch.setattr(search, "driven_here", Drives(14))
+    with pytest.raises(StoppedError, match="13 runs, kept in"):
+        search.search_campaign(campaign, Goal.COLLISION, 40, campaign.parent / "out", 1)
+    assert found(campaign) == ["collision", "refused"]
+
+
+def test_no_more_than_so_many_are_made_small(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(search, "driven_here", Drives(10_000))
+    monkeypatch.setattr(search, "MOST_KEPT", 3)
+    search.search_campaign(campaign, Goal.COLLISION, 40, campaign.parent / "out", 1)
+    assert len(found(campaign)) == 3
+    assert capsys.readouterr().out.splitlines()[-1].endswith("; no more than 3 are made small, 1 were left out")
