@@ -11,6 +11,7 @@ SOURCES := $(shell find companion sitl -name '*.py')
 NAVIGATORS := hybrid,bspline-ga,astar,theta-star,dstar-lite,dijkstra,achour,prm,vertex++
 CANDIDATES := python3.11 python3.12 python3.13 python3.14 python3 python
 GAME_MAPS := $(addprefix ../shared/data/movingai/dao/,arena.map lak104d.map)
+BARN := $(addprefix --worlds ,$(wildcard ../shared/data/barn/worlds.npz))
 # For make fuzz: how long it searches.
 SECONDS := 600
 # Container images often set this. Without compiled bytecode each start of a program takes three times as long.
@@ -64,9 +65,21 @@ results: $(TOOLS)
 	$(BIN)/rover-sitl experiment navigation --runs 30 --planners $(NAVIGATORS) --docs docs
 	$(BIN)/rover-sitl experiment driving --runs 30 --docs docs
 	$(BIN)/rover-sitl experiment traffic --docs docs
+	$(BIN)/rover-sitl experiment barn --runs 2 $(BARN) --docs docs
+	for setup in guarded jackal strict; do \
+	  $(BIN)/rover-sitl experiment barn --runs 10 --controllers motion-ga --setups $$setup $(BARN) --docs docs || exit; done
+	$(BIN)/rover-sitl experiment missions --runs 25 --controllers motion-ga --guard --docs docs
+	$(BIN)/rover-sitl experiment missions --runs 8 --controllers motion-ga --docs docs
+	$(BIN)/rover-sitl experiment controllers --runs 34 --controllers points,motion-ga,dwa,mppi --docs docs
+	$(BIN)/rover-sitl experiment gates --runs 50 --controllers motion-ga --setups guarded --docs docs
+	$(BIN)/rover-sitl experiment gates --runs 4 --setups strict --docs docs
 	$(BIN)/rover-sitl experiment dead-companion --runs 6 --docs docs
+	$(BIN)/rover-sitl experiment dead-companion --runs 140 --controllers motion-ga --guard --docs docs
+	$(BIN)/rover-sitl experiment dead-companion --runs 140 --controllers motion-ga --docs docs
 	$(BIN)/rover-companion bench $(wildcard $(GAME_MAPS)) --sizes 1,4,16,40 --cell-s 0.8 --docs docs
 	$(BIN)/rover-sitl experiment killed-companion --runs 10 --docs docs
+	$(BIN)/rover-sitl experiment killed-companion --runs 1 --controllers motion-ga --guard --docs docs
+	$(BIN)/rover-sitl experiment killed-companion --runs 1 --controllers motion-ga --docs docs
 
 soak: $(KERNELS)
 	$(BIN)/rover-sitl experiment soak --runs 100 --json out/soak.json --docs docs

@@ -74,7 +74,7 @@ def driven(mission: Mission, limit_s: float) -> tuple[float, list[str]]:
     truth, start = drive.simulator.truth, drive.simulator._start
     assert drive.simulator.collisions == ()
     came_m = math.hypot(truth.north_m - start.north_m, truth.east_m - start.east_m)
-    return came_m, [text for text in drive.companion.outcome.said if "uarded" in text]
+    return came_m, [text for text in drive.companion.outcome.said if "uarded" in text or "No guard" in text]
 
 
 @pytest.mark.thorough
@@ -82,9 +82,10 @@ def test_it_is_told_at_the_start(guarded: Mission) -> None:
     """On open ground the rover comes as far without it: positions lead there (narrow ground: test_barn.py)."""
     assert guarded.sitl is not None
     came_m, said = driven(guarded, UNDER_WAY_S)
-    alone_m, nothing = driven(replace(guarded, sitl=replace(guarded.sitl, parameters=None)), UNDER_WAY_S)
+    alone_m, alone = driven(replace(guarded, sitl=replace(guarded.sitl, parameters=None)), UNDER_WAY_S)
     assert came_m > 5.0 and alone_m > 0.85 * came_m, "in the same time"
-    assert len(said) == 1 and nothing == []
+    assert [text[:9] for text in said] == ["Guarded: "]
+    assert [text[:25] for text in alone] == ["No guard on the autopilot"] and "for 3 s" in alone[0]
 
 
 def test_it_is_printed_written_and_uploaded_and_works_after_a_restart(tmp_path: Path) -> None:

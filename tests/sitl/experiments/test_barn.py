@@ -117,10 +117,11 @@ def test_points_take_more_than_twice_the_time_there() -> None:
 
 
 @pytest.mark.thorough
-def test_without_a_guard_it_takes_longer_and_with_a_jackals_limits_less() -> None:
+def test_without_a_guard_it_takes_longer_and_with_a_jackals_limits_it_arrives() -> None:
     setups = (Setup.JACKAL, Setup.GUARDED, Setup.STRICT)
     quick, guarded, strict = (drive(made_world(3), "motion-ga", 0, setup) for setup in setups)
-    assert strict.end is RunEnd.REACHED and quick.seconds < guarded.seconds < strict.seconds
+    assert [one.end for one in (quick, guarded, strict)] == [RunEnd.REACHED] * 3
+    assert guarded.seconds < strict.seconds
 
 
 def test_intervals_and_the_worst() -> None:
