@@ -278,24 +278,26 @@ TWO_COSTS = (
 
 
 def motion_lines(choice: MotionChoice) -> list[str]:
-    """Motions that were judged, from the cheapest to the dearest, and what was told."""
+    """Motions that were judged, from the cheapest to the dearest, and what the controller made of the chosen one."""
     costs_s = choice.found.costs_s
     order, free = np.argsort(costs_s), int((costs_s < BLOCKED_S).sum())
     last = len(order) - 1
     lines = [
-        f"motions: {len(order)} judged, {choice.problem.horizon_s:g} s long, {free} of them touch nothing; their cost: "
-        "seconds until the end of the next metres of the path, with what is added for risk"
+        f"motions: {len(order)} judged, {choice.problem.horizon_s:g} s long, {free} of them touch nothing, in the first "
+        "tick after the decision; their cost: seconds until the end of the next metres of the path, and something for "
+        "risk"
     ]
     for share in RANKS:
         rank = round(share * last)
         lines.append(f"  {rank + 1:4d}. {_motion_text(choice, order[rank])}")
     told = choice.told
     lines.append(
-        f"chosen: cost {choice.found.cost_s:.2f} s; told: {told.speed_m_s:.2f} m/s, "
-        f"{math.degrees(told.turn_rad_s):.0f} deg/s"
+        f"chosen: cost {choice.found.cost_s:.2f} s; the controller's command: {told.speed_m_s:.2f} m/s, "
+        f"{math.degrees(told.turn_rad_s):.0f} deg/s. Making way and the last look may send less: "
+        "report --csv says what was sent"
     )
     if choice.ahead is not None:
-        lines.append(f"a position ahead was told in its place: it leads on faster, at {choice.ahead.speed_m_s:.2f} m/s")
+        lines.append(f"a position ahead takes its place: it leads on faster, at {choice.ahead.speed_m_s:.2f} m/s")
     return lines
 
 

@@ -344,7 +344,7 @@ def test_why_shows_the_motions_that_were_judged(tmp_path: Path) -> None:
     assert judged[0].startswith("64 judged, 2.5 s long")
     costs = [float(line.partition("cost ")[2].partition(" s")[0]) for line in judged[1:6] if "cost " in line]
     assert costs and costs == sorted(costs)
-    assert f"chosen: cost {costs[0]:.2f} s; told: " in result.output
+    assert f"chosen: cost {costs[0]:.2f} s; the controller's command: " in result.output
     with Image.open(tmp_path / "r" / f"why-{number}-motions.png") as image:
         colours = {colour for _, colour in image.convert("RGB").getcolors(1 << 20) or []}
     assert {TAKEN_COLOUR, CHEAP_COLOUR, UNSEEN_COLOUR, START_COLOUR} <= colours
