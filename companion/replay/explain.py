@@ -283,9 +283,8 @@ def motion_lines(choice: MotionChoice) -> list[str]:
     order, free = np.argsort(costs_s), int((costs_s < BLOCKED_S).sum())
     last = len(order) - 1
     lines = [
-        f"motions: {len(order)} judged, {choice.problem.horizon_s:g} s long, {free} of them touch nothing, in the first "
-        "tick after the decision; their cost: seconds until the end of the next metres of the path, and something for "
-        "risk"
+        f"motions: {len(order)} judged, {choice.problem.horizon_s:g} s long, {free} of them touch nothing, in the "
+        "first tick after the decision; their cost: seconds until the end of the next metres of the path, and for risk"
     ]
     for share in RANKS:
         rank = round(share * last)
