@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from companion.control.model_estimate import described
 from companion.replay.replay import ReplayResult
 from companion.viewer.frame import NOT_REACHED
 from companion.viewer.run_tally import RunTally, Spell
@@ -137,6 +138,8 @@ def _figures(run: Run) -> Json:
         ["packets sent", f"{result.said}"],
         ["differences of the replay", f"{len(result.differences) or 'none'}"],
     ]
+    estimate = None if result.companion is None else result.companion.estimate
+    rows += [] if estimate is None else [["how it follows velocities", described(estimate)]]
     return {"title": "The run", "head": ["", ""], "rows": rows}
 
 

@@ -9,6 +9,8 @@ from typing import Any, cast
 import pytest
 
 from companion.cli.report import _line
+from companion.control.following import AS_SHIPPED
+from companion.control.model_estimate import ModelEstimate
 from companion.replay.replay import ReplayResult
 from companion.viewer.report_tables import Run, _figures, differences
 from companion.viewer.run_tally import RunTally
@@ -33,6 +35,16 @@ def test_one_stop_is_one_time() -> None:
             row[1] for row in _figures(Run("a", "Yard", tally, ReplayResult(), None))["rows"] if "stopped" in row[0]
         ]
     assert said == ["0.0 s, 0 times", "0.0 s, 1 time", "0.0 s, 2 times"]
+
+
+def test_it_tells_how_the_rover_followed_velocities() -> None:
+    result = ReplayResult()
+    last = ["differences of the replay", "none"]
+    assert _figures(Run("a", "Yard", RunTally(), result, None))["rows"][-1] == last
+    estimate = ModelEstimate(AS_SHIPPED, AS_SHIPPED)
+    result.companion = cast(Any, SimpleNamespace(estimate=estimate))
+    told = _figures(Run("a", "Yard", RunTally(), result, None))["rows"][-1]
+    assert told[0] == "how it follows velocities" and told[1].startswith("after 0.30 s, gains 1.00 and loses 1.00 m/s")
 
 
 @pytest.mark.parametrize(("size", "says"), [(3, "1 kB"), (42_300, "42 kB"), (99_999, "100 kB"), (640_000, "0.6 MB")])
