@@ -18,7 +18,7 @@ from sitl.faults.plan import LinkEffect, LinkFault
 from sitl.lockstep import Drive
 from sitl.sim_link import HEAD_BYTES, MAGIC_2, packet_bytes
 
-GUIDED, AUTO, ARMED = 15, 10, 128
+HOLD, AUTO, GUIDED, ARMED = 4, 10, 15, 128
 AUTOPILOT = 1
 HEARTBEAT = 0
 LEG = 86
@@ -53,7 +53,8 @@ class WireWatch:
         """What was sent to move the rover, to set its mode or to arm it though a person or a failsafe had it.
 
         So the last heartbeat had told another mode than GUIDED, or disarmed. Before the rover was in GUIDED for the
-        first time the companion may set it, and arm once.
+        first time the companion may set it, and arm once, unless it was armed in another mode than HOLD: that is a
+        person's.
         """
         self.blind_s = 0.0
         """So long the rover moved on without range data though it should have braked, or have stood."""
@@ -65,7 +66,8 @@ class WireWatch:
         self._brakes_m_s2 = BRAKES * (limits.get("ATC_DECEL_MAX", 0.0) or usual_m_s2)
         self._may_send = True
         self._mode: int | None = None
-        self._was_guided = self._was_armed = False
+        self._may_take = True
+        self._was_armed = False
         self._last_s = self._ranges_s = self._line_s = self._since_s = self._fastest_m_s = 0.0
         self._leg_s = -math.inf
         self._mav = mavlink.MAVLink(None)
@@ -82,7 +84,7 @@ class WireWatch:
         """Setpoints in every form that ``link.setpoint`` may choose; modes and arming once it was the companion's."""
         command = int.from_bytes(packet[COMMAND_AT], "little") if kind in COMMANDS else 0
         if kind == SET_MODE or command == DO_SET_MODE:
-            return self._was_guided and self._mode != GUIDED
+            return not self._may_take and self._mode != GUIDED
         return kind in DRIVES or command == REPOSITION or (command == ARM and self._was_armed)
 
     def _heard(self, time_s: float, data: bytes) -> None:
@@ -110,7 +112,7 @@ class WireWatch:
                 self._mode, armed = beat.custom_mode, bool(beat.base_mode & ARMED)
                 leg = self._run.mission.in_auto and self._mode == AUTO and time_s - self._leg_s <= LEG_S
                 self._may_send = armed and (self._mode == GUIDED or leg)
-                self._was_guided |= self._mode == GUIDED
+                self._may_take &= self._mode != GUIDED and (self._mode == HOLD or not armed)
                 self._was_armed |= self._may_send
 
     def _moves_blind(self, silent_s: float) -> bool:

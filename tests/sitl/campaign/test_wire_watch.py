@@ -191,6 +191,15 @@ def test_at_the_start_the_companion_sets_guided_and_arms_once() -> None:
     assert watch.against_pilot == 1, "it never arms a second time"
 
 
+def test_a_rover_that_is_armed_in_manual_at_the_start_is_a_persons() -> None:
+    watch = WireWatch(made_up())
+    heard_by(watch, 0.5, beat(0))
+    said_by(watch, 0.55, long(176, 1.0, 4.0))
+    heard_by(watch, 1.0, beat(4))
+    said_by(watch, 1.05, long(176, 1.0, 15.0))
+    assert watch.against_pilot == 2, "also when that person has set HOLD"
+
+
 @pytest.mark.parametrize(
     ("in_auto", "leg_s", "counts"), [(False, 0.9, 1), (True, 0.9, 0), (True, -9.0, 1)], ids=["own", "leg", "no leg"]
 )
