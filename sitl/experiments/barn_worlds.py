@@ -87,12 +87,18 @@ def read_worlds(file: Path) -> list[BarnWorld]:
             ]
     except OSError as error:
         raise ExperimentError(f"{file}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, KeyError, EOFError, BadZipFile) as error:  # whose texts are of numpy's inner life
+    except (ValueError, KeyError, IndexError, EOFError, BadZipFile) as error:  # whose texts are of numpy's inner life
         raise ExperimentError(
             f"{file}: no archive of BARN worlds; give a .npz with the arrays number, lattice and path_NUMBER"
         ) from error
     if not worlds:
         raise ExperimentError(f"{file}: has no world")
+    for world in worlds:
+        if world.lattice.shape != (ROWS, COLUMNS):
+            raise ExperimentError(
+                f"{file}: the lattice of world {world.number} has the shape {world.lattice.shape}; "
+                f"one of {ROWS} x {COLUMNS} cells is needed"
+            )
     return worlds
 
 

@@ -133,6 +133,17 @@ def test_intervals_and_the_worst() -> None:
     assert with_interval(runs, lambda run: run.score()) == "0.208 (0.000 to 0.500)"
 
 
+@pytest.mark.parametrize("shape", [(40, 20), (64,), (30, 64)])
+def test_a_lattice_of_another_shape_is_refused_in_one_line(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    steps = np.zeros((2, 2), np.int64)
+    np.savez(tmp_path / "w.npz", number=np.array([6]), lattice=np.zeros((1, *shape), np.bool_), path_6=steps)
+    with pytest.raises(ExperimentError, match=r"w\.npz: the lattice of world 6 has the shape .*; one of 64 x 30 cells"):
+        read_worlds(tmp_path / "w.npz")
+    np.savez(tmp_path / "w.npz", number=np.array([6]), lattice=np.zeros((1, 64, 30), np.bool_), path_6=steps[0])
+    with pytest.raises(ExperimentError, match=r"w\.npz: no archive of BARN worlds"):
+        read_worlds(tmp_path / "w.npz")
+
+
 @pytest.mark.parametrize("content", [b"", b"no archive"])
 def test_a_file_that_is_no_archive_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "worlds.npz"
