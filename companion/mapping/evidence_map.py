@@ -28,8 +28,8 @@ from companion.mapping.sensor_agreement import SensorAgreement
 from companion.settings import MappingSettings
 
 MAX_EVIDENCE_CELLS = 33_000_000
-"""Room for a target 200 m away, on cells of 0.05 m. Cells that no scan has changed take no memory until the whole map is
-moved or restored."""
+"""Room for a target 200 m away, on cells of 0.05 m. Cells that no scan has changed take no memory until the whole
+map is moved or restored."""
 BLIND_M = 0.3
 """Beyond the least range of a wired lidar: what was seen nearer than that may now be too near to give an echo."""
 MAX_SOFT_WEIGHT = 0.9
