@@ -1,8 +1,8 @@
-"""Left alone: where a rover goes that is told one velocity and then nothing more, and what its outline meets there.
+"""Left alone: where a rover goes that is told one thing and then nothing more, and what its outline meets there.
 
-This is the last look's own reckoning. It shares no code with the planning of motions: it asks each cell of the evidence
-map under the outline, not a field of distances, and follows the rover in steps of its own. So an error there is not
-repeated here. It is a little milder than the planning, so that it speaks only where something is wrong.
+This is the last look's own reckoning. It shares no code with controllers and planning: it asks each cell of the
+evidence map under the outline, not a field of distances or a line, and follows the rover in steps of its own. So an
+error there is not repeated here. It is a little milder, so that it speaks only where something is wrong.
 
 Nouns: left alone.
 """
@@ -40,6 +40,11 @@ must get out of it by the second."""
 UNDER_M, BESIDE = 0.3, 2.0
 """No sensor sees the ground on which the rover can turn and so much round it, nor what lies that many times its half
 width beside it."""
+
+CORNER = 0.75
+"""A rover at the border of its field may cut the corner of a closed one within this share of a field's side."""
+PIECE_M = 0.05
+"""A way of the middle is looked at so often."""
 
 Places = NDArray[np.float64]
 """Shape (n, 4): metres north and east of the map's corner, heading, forward speed."""
@@ -105,6 +110,19 @@ def once_turned_back(places: Places, setpoint: GuidedVelocity, view: LocalView) 
         return places
     turned = np.flatnonzero(places[:, 3] * setpoint.forward_m_s > 0.0)
     return places[min(turned[0] if len(turned) else len(places), len(places) - 2) :]
+
+
+def along(way: NDArray[np.float64], radius_m: float, evidence: EvidenceMap, away: float = AWAY) -> tuple[int, int]:
+    """How many places of a way a disc of this radius passes before it lies over something that stands there, over a
+    closed field or off the map; and how many before its middle is on unseen ground.
+
+    ``way``: shape (n, 2), metres north and east in the local frame. ``away``: with each metre the disc must get out of
+    what it lies over at first by so much. A thing may fill the whole of its cell.
+    """
+    corner, reach_m = evidence.base.south_west, radius_m + 0.5 * evidence.evidence_m
+    disc = Outline(reach_m, reach_m, reach_m, True)
+    clear, seen = passes(way - np.array((corner.north_m, corner.east_m)), disc, away, _rasters(evidence))
+    return int(clear), int(seen)
 
 
 def first_met(places: Places, view: LocalView) -> Met:
@@ -286,3 +304,29 @@ def meets(places, outline, under, under_m, evidence):
             return 3
         was_closed = closed
     return 0
+
+
+@njit(cache=True, nogil=True)
+def passes(way, disc, away, evidence):
+    """See ``along``; places count from the map's corner. What the disc lies over at first may be left, not entered."""
+    place = np.array((way[0, 0], way[0, 1], 0.0))
+    begins_m, _ = _deepest(place, disc, way[0], math.inf, evidence)
+    height, width = evidence.log_odds.shape
+    cell_m, count = evidence.cell_m, way.shape[0]
+    corner_m = CORNER * cell_m * (height // evidence.base.shape[0])
+    seen, unseen_m = count, -PIECE_M
+    for at in range(1, count):
+        place[0], place[1] = way[at, 0], way[at, 1]
+        y, x = int(math.floor(place[0] / cell_m)), int(math.floor(place[1] / cell_m))
+        gone_m = math.hypot(way[at, 0] - way[0, 0], way[at, 1] - way[0, 1])
+        if not (0 <= y < height and 0 <= x < width):
+            return at, min(seen, at)
+        unseen_m = unseen_m + PIECE_M if evidence.log_odds[y, x] == 0.0 else -PIECE_M
+        if unseen_m > 0.5 * cell_m and seen == count:
+            seen = at - int(round(unseen_m / PIECE_M))  # a corner of a cell alone does not count
+        deep_m, _ = _deepest(place, disc, way[0], math.inf, evidence)
+        if deep_m > max(begins_m + AWAY_M - away * gone_m, 0.0):
+            return at, seen
+        if gone_m > corner_m and _is_deep_in_closed(place, evidence, True):
+            return at, seen
+    return count, seen

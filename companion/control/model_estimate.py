@@ -35,6 +35,9 @@ MOST_DEAD_S = DEADS_S[-1]
 CHANGES = (0.03, -0.03, 0.1, -0.1)
 """The other figures are tried with so much more or less."""
 FIGURES = ("acceleration_m_s2", "deceleration_m_s2", "turn_acceleration_rad_s2", "turn_gain")
+TELLS_S = 0.4
+"""The first three stay as they are while the last seconds hold less than this of gathering speed, of braking, of
+changing the turn rate: drawn to what it began with, a figure would forget what was found."""
 LEAST_SHARE, MOST_SHARE = 0.5, 2.0
 """No figure leaves these bounds, of what it began with."""
 ERROR_M_S, ERROR_RAD_S = 0.1, 0.15
@@ -144,7 +147,11 @@ def _fitted(before: ModelEstimate, rows: NDArray[np.float64]) -> ModelEstimate:
         tried = best._replace(dead_s=dead_s)
         if (error := _error(tried, began, rows)) < least:
             best, least = tried, error
-    for name in FIGURES:
+    in_window = Fit(*fit_of(best, rows, -math.inf))
+    told_s = (in_window.gathers_s, in_window.brakes_s, in_window.turns_s, math.inf)
+    for name, tells_s in zip(FIGURES, told_s, strict=True):
+        if tells_s < TELLS_S:
+            continue
         usual = getattr(began, name)
         for change in CHANGES:
             value = min(max(getattr(best, name) * (1.0 + change), LEAST_SHARE * usual), MOST_SHARE * usual)

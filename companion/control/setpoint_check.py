@@ -2,8 +2,8 @@
 
 A setpoint may be the last one that the autopilot receives, and it is followed to its end. So each one is asked
 whether the rover may be left alone with it. One that may not is replaced by velocity zero, reported and counted.
-That this never happens is the task of the controllers. For points this file asks the map and the braking formulas as
-they do, but uses none of their decisions; for planned motions it reckons anew, in ``left_alone``.
+That this never happens is the task of the controllers. What lies on the way is reckoned anew, in ``left_alone``; only
+the formulas of how far the rover goes beyond a point, and brakes, are those of the controllers.
 
 Nouns: setpoint check.
 """
@@ -14,13 +14,15 @@ import math
 from collections import Counter
 from collections.abc import Callable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from companion.control.braking import blind_distance_m, braking_distance_m, farthest_m, overshoot_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
-from companion.control.left_alone import Met, Places, first_met, once_turned_back, ways_left_alone
+from companion.control.left_alone import PIECE_M, Met, Places, along, first_met, once_turned_back, ways_left_alone
 from companion.control.local_view import LocalView
 from companion.core.frames import NedPoint
 from companion.core.severity import Severity, TextSink
-from companion.mapping.map_queries import ArcQueries, Until, look_along
 from companion.mission.bounds import Bounds
 from companion.safety.reasons import Reason, SetpointFault
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity, Setpoint
@@ -56,12 +58,13 @@ def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fa
     overshoots_m = overshoot_m(distance_m, view.speed_m_s, settings) + view.further_m
     stands = here.moved(here.bearing_rad(there), distance_m + overshoots_m)
     if not evidence.base.contains(evidence.base.cell_at(stands)):
-        stands, overshoots_m = there, 0.0  # nothing is known beyond the edge of the map
-    line = look_along(evidence, here, stands, view.rover.radius_m)
-    if line.clear_m < distance_m + overshoots_m - SLACK_M:
+        overshoots_m = 0.0  # nothing is known beyond the edge of the map
+    way = _way(here, here.bearing_rad(there), 0.0, distance_m + overshoots_m - SLACK_M)
+    clear, seen = along(way, view.rover.radius_m, evidence)
+    if clear < len(way):
         return Reason(SetpointFault.BEHIND_OBSTACLE)
     beyond_m = braking_distance_m(settings.min_speed_m_s, settings)
-    if line.seen_m + beyond_m < distance_m - SLACK_M:
+    if seen * PIECE_M + beyond_m < distance_m - SLACK_M:
         return Reason(SetpointFault.ON_UNSEEN_GROUND)
     return None
 
@@ -81,13 +84,18 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
     if forward_m_s == 0.0:
         return None
     base_m_s = max(view.speed_m_s, view.settings.steering.scale_base_m_s)
-    reach_m = blind_distance_m(abs(forward_m_s), view.settings.guidance)
-    arcs = ArcQueries(view.evidence, view.pose)
-    room_m = arcs.kept_room_m(view.evidence.rover_radius_m - NEARER_M, 0.0)
-    course_rad = _course_rad(setpoint, view)
-    if arcs.arc_clear_m(course_rad, yaw_rate_rad_s / base_m_s, room_m, reach_m, Until.BLOCKED) < reach_m - SLACK_M:
-        return Reason(SetpointFault.INTO_OBSTACLE)
-    return None
+    reach_m = blind_distance_m(abs(forward_m_s), view.settings.guidance) - SLACK_M
+    way = _way(view.pose.point, _course_rad(setpoint, view), yaw_rate_rad_s / base_m_s, reach_m)
+    clear, _ = along(way, view.rover.radius_m - NEARER_M, view.evidence, away=0.0)
+    return Reason(SetpointFault.INTO_OBSTACLE) if clear < len(way) else None
+
+
+def _way(start: NedPoint, course_rad: float, curvature_per_m: float, length_m: float) -> NDArray[np.float64]:
+    """Places on an arc, a piece apart; shape (n, 2), metres north and east. Its first one is where it begins."""
+    gone_m = np.arange(0.0, max(length_m, 0.0) + 0.5 * PIECE_M, PIECE_M)
+    courses_rad = course_rad + curvature_per_m * (gone_m[1:] - 0.5 * PIECE_M)
+    steps = PIECE_M * np.column_stack((np.cos(courses_rad), np.sin(courses_rad)))
+    return np.cumsum(np.vstack(((start.north_m, start.east_m), steps)), axis=0)
 
 
 def _left_alone(setpoint: GuidedVelocity, view: LocalView) -> Fault | None:

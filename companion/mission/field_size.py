@@ -24,6 +24,8 @@ ARC_RADII = 0.72
 BEAMS_M = 1.0
 """With smaller fields a rover that sees with single beams tries narrower gaps, of whose edges it sees little: at gates
 of 0.8 to 1.1 m it touched in 2 of 36 drives with fields of 0.5 m, in none of 36 with these."""
+FINE_ENOUGH = 1.01
+"""Times the side that narrow ground needs: no smaller fields are of use."""
 FINER_M, FINER_SHARE = 0.05, 1.0 / 3.0
 """With small fields evidence is finer: this share of their side, and no less than FINER_M."""
 
@@ -44,7 +46,7 @@ class FieldSize:
 
     def may_be_finer(self, side_m: float) -> bool:
         """Whether smaller fields than those of this side would open more gaps."""
-        return side_m > 1.01 * self.fine_m
+        return side_m > FINE_ENOUGH * self.fine_m
 
 
 def field_size(rover: RoverSpec, settings: MappingSettings, *, narrow_sight: bool = False) -> FieldSize:
@@ -72,9 +74,16 @@ def finer_evidence(settings: MappingSettings, resolution_m: float) -> MappingSet
 
 
 def sure_gap_m(rover: RoverSpec, settings: MappingSettings, resolution_m: float) -> float:
-    """A gap of this width is open on the map wherever it lies and however it is turned, to a tenth of a metre."""
+    """A gap of this width is open on the map wherever it lies and however it is turned, to a tenth of a metre.
+
+    The middles of fields must form a way through it; for planned motions, with fields that are fine enough, the
+    middles of evidence cells.
+    """
     kept_m = map_radius_m(rover, settings) + settings.evidence_m
-    return math.ceil(10.0 * (2.0 * kept_m + math.sqrt(2.0) * resolution_m) - 0.5) / 10.0
+    fine_m = field_size(rover, settings).fine_m
+    is_roomy = settings.keeps == "outline" and resolution_m <= FINE_ENOUGH * fine_m
+    between_m = settings.evidence_m if is_roomy else resolution_m
+    return math.ceil(10.0 * (2.0 * kept_m + math.sqrt(2.0) * between_m) - 0.5) / 10.0
 
 
 def finer_gap_m(rover: RoverSpec, settings: MappingSettings, resolution_m: float) -> float:

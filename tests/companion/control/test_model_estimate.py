@@ -118,3 +118,17 @@ def test_what_an_earlier_run_found_counts_once_the_same_is_assumed() -> None:
 def test_it_is_told_in_one_line() -> None:
     line = described(ModelEstimate(AS_SHIPPED, AS_SHIPPED, KNOWN_S, 0.5 * KNOWN_S, KNOWN_S))
     assert "0.30 s" in line and "50% known" in line and "\n" not in line
+
+
+def test_what_was_found_stays_while_nothing_tells() -> None:
+    """Half a minute at one speed holds neither braking nor gathering speed."""
+    rover = Following(0.3, 0.7, 0.6, 1.5, 1.0)
+    estimator = watched(rover, 30.0)
+    found, lately = estimator.estimate.figures, Told()
+    for tick in range(600):
+        now_s = 100.0 + tick * TICK_S
+        lately = after(lately, GuidedVelocity(1.0, 0.0), now_s)
+        estimator.note(LocalView(Pose(0.0, 0.0, 0.0, now_s), 1.0, EVIDENCE, LIMITS, SETTINGS, 0.0, lately=lately))
+    kept = estimator.estimate.figures
+    assert found.deceleration_m_s2 == pytest.approx(0.6, rel=0.2)
+    assert kept[1:4] == found[1:4]

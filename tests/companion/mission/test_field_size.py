@@ -75,3 +75,11 @@ def test_a_rover_of_the_default_size_drives_through_a_metre() -> None:
     assert sure_gap_m(RoverSpec(), finer_evidence(CIRCLE, 0.15), 0.15) == pytest.approx(1.0)
     assert sure_gap_m(RoverSpec(), finer_evidence(CIRCLE, 0.25), 0.25) == pytest.approx(1.2)
     assert sure_gap_m(RoverSpec(), CIRCLE, 1.0) == pytest.approx(2.4)
+
+
+@pytest.mark.parametrize(("side_m", "gap_m"), [(0.25, 0.9), (0.4, 1.4)])
+def test_planned_motions_go_through_what_the_outline_needs_where_fields_are_fine_enough(
+    side_m: float, gap_m: float
+) -> None:
+    """Gates of 0.9 m are passed by a rover of 0.7 m with the fields that follow from it."""
+    assert sure_gap_m(RoverSpec(0.35), finer_evidence(OUTLINE, side_m), side_m) == pytest.approx(gap_m)
