@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from sitl.cli.commands import app
 from sitl.experiments.barn import (
     FASTEST,
     OLD_FASTEST,
@@ -23,7 +26,8 @@ from sitl.experiments.barn import (
     worst,
 )
 from sitl.experiments.barn_worlds import BODY_M, START_M, BarnWorld, made_world, read_worlds
-from sitl.experiments.experiment import ExperimentError, Options
+from sitl.experiments.experiment import Advance, ExperimentError, Options
+from sitl.experiments.gates import GatesReport
 from sitl.experiments.off_model import off_model
 from sitl.plant.rover import SIM_ROVER
 from tests.support.shared_data import SHARED
@@ -131,6 +135,50 @@ def test_intervals_and_the_worst() -> None:
     runs = [one(0, RunEnd.REACHED, 6.0), one(1, RunEnd.CONTACT, 2.0), one(2, RunEnd.REACHED, 50.0)]
     assert [run.world for run in worst(runs)] == [1, 2, 0]
     assert with_interval(runs, lambda run: run.score()) == "0.208 (0.000 to 0.500)"
+
+
+def numbered(numbers: Sequence[int]) -> tuple[BarnWorld, ...]:
+    """Worlds of which nothing but the number counts."""
+    return tuple(BarnWorld(number, np.zeros((64, 30), np.bool_), np.zeros((2, 2))) for number in numbers)
+
+
+@pytest.mark.parametrize(
+    ("archive", "numbers", "driven"),
+    [
+        (None, range(50), "50 worlds of our own making, 1 seed each"),
+        (Path("all.npz"), range(300), "the standard set of 50 worlds, 1 seed each"),
+        (Path("few.npz"), [0, 6, 7], "3 worlds of few.npz, not the standard set, 1 seed each"),
+    ],
+)
+def test_title_and_page_say_what_is_driven(archive: Path | None, numbers: Sequence[int], driven: str) -> None:
+    worlds = standard(numbered(numbers))
+    runs = tuple(
+        BarnRun("dwa", Setup.GUARDED, world.number, 0, RunEnd.REACHED, 6.0, 5.0, np.zeros((1, 2))) for world in worlds
+    )
+    report = BarnReport(Options(1, archive=archive), worlds, {(Setup.GUARDED, "dwa"): runs})
+    (table,) = report.tables()
+    assert str(table.title) == f"barn, guarded: {driven}"
+    page = " ".join(report.section().split())
+    assert f"{driven[0].upper()}{driven[1:]}. Protocol" in page
+    assert "gets 72 distances, each the shortest of 10 rays" in page
+    assert ("The 3 worst runs" if len(runs) == 3 else "The 10 worst runs") in page
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "runs"), [("barn", [], 10), ("gates", [], 100), ("barn", ["--runs", "3"], 3)]
+)
+def test_barn_has_ten_seeds_if_nothing_is_said(
+    monkeypatch: pytest.MonkeyPatch, name: str, given: list[str], runs: int
+) -> None:
+    asked: list[Options] = []
+
+    def quick(options: Options, advance: Advance) -> GatesReport:
+        asked.append(options)
+        return GatesReport(options, ())
+
+    monkeypatch.setattr(f"sitl.experiments.{name}.run", quick)
+    assert CliRunner().invoke(app, ["experiment", name, *given]).exit_code == 0
+    assert [one.runs for one in asked] == [runs]
 
 
 @pytest.mark.parametrize("shape", [(40, 20), (64,), (30, 64)])
