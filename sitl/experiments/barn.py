@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -24,6 +25,7 @@ from companion.settings import Settings
 from companion.settings.settings import CONTROLLERS
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.experiments import drawing
+from sitl.experiments.barn_measures import SPREAD_HEAD, difficulty_of, spread_rows
 from sitl.experiments.barn_worlds import GOAL_M, START_M, BarnWorld, made_world, read_worlds
 from sitl.experiments.experiment import (
     GUARD,
@@ -204,9 +206,13 @@ class BarnReport(ExperimentReport):
         return super().section_name + "".join(f"-{one}" for one in self._others())
 
     def tables(self) -> list[Table]:
-        """One a setup, with a row a controller."""
+        """How hard the worlds are, and one a setup, with a row a controller."""
         driven = f"{self._driven()}, {_counted(self.options.runs, 'seed')} each"
-        return [terminal_table(f"{NAME}, {one}: {driven}", HEAD, self._rows(one, plain=True)) for one in self._setups()]
+        rows = {one: self._rows(one, plain=True) for one in self._setups()}
+        return [
+            terminal_table(f"{NAME}: {self._driven()}, how hard they are", SPREAD_HEAD, self._spread),
+            *(terminal_table(f"{NAME}, {one}: {driven}", HEAD, own) for one, own in rows.items()),
+        ]
 
     def as_json(self) -> dict[str, object]:
         """Every run."""
@@ -216,6 +222,11 @@ class BarnReport(ExperimentReport):
             for run in runs
         ]
         return {"experiment": NAME, "seed": self.options.seed, "runs": runs}
+
+    @cached_property
+    def _spread(self) -> list[list[str]]:
+        """Of the worlds' measures."""
+        return spread_rows([difficulty_of(world) for world in self.worlds])
 
     def _driven(self) -> str:
         """Which worlds, in words."""
@@ -266,6 +277,11 @@ outline (0.508 x 0.430 m) and drives at 2 m/s. Its lidar has 720 rays over 270 d
 gets {LIDAR.sectors} distances, each the shortest of {LIDAR.rays} rays. In each run the rover's speed, lag and turn
 rate, and its limits of acceleration, braking and turning, are
 {self.options.mismatch}.
+
+How hard the worlds are, along the shortest way among the posts ([measures](worlds.md#worlds-from-seeds)); so many
+worlds have at most these figures:
+
+{markdown_table(SPREAD_HEAD, self._spread)}
 
 *score*: as counted since 2026, at most 0.5; *old score*: as before, at most 0.25; *t / OT*: mean time over the optimal
 time, of runs that reached the goal. In brackets: 95 % intervals, by resampling worlds.

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from sitl.cli.commands import app
 from sitl.experiments.barn import (
     FASTEST,
+    MADE,
     OLD_FASTEST,
     BarnReport,
     BarnRun,
@@ -25,7 +28,8 @@ from sitl.experiments.barn import (
     with_interval,
     worst,
 )
-from sitl.experiments.barn_worlds import BODY_M, START_M, BarnWorld, made_world, read_worlds
+from sitl.experiments.barn_measures import difficulty_of
+from sitl.experiments.barn_worlds import BODY_M, FIRST_ROW, START_M, BarnWorld, made_world, read_worlds
 from sitl.experiments.experiment import Advance, ExperimentError, Options
 from sitl.experiments.gates import GatesReport
 from sitl.experiments.off_model import off_model
@@ -72,10 +76,48 @@ def test_its_worlds_are_where_the_challenge_has_them(worlds: list[BarnWorld]) ->
 def test_our_own_worlds_come_from_their_seed_and_have_a_way(seed: int) -> None:
     world, again = made_world(seed), made_world(seed)
     assert np.array_equal(world.lattice, again.lattice) and 5.0 < world.optimal_s < 9.0
-    share = world.lattice[30:, 1:-1].mean()
-    assert 0.02 < share < 0.4
+    share = world.lattice[FIRST_ROW:, 1:-1].mean()
+    assert 0.02 < share < 0.4 and not world.lattice[1:FIRST_ROW, 1:-1].any()
     ground = world.world()
     assert min(ground.clearance_m(float(y), float(x), 1.0) for x, y in world.path_m) > BODY_M - 0.1
+
+
+QUARTILES_OF_BARN = np.array(
+    [[0.51, 2.42, 3.46, 1.73, 1.01], [0.55, 2.71, 3.98, 2.01, 1.03], [0.66, 3.09, 4.04, 2.53, 1.06]]
+)
+"""Of the challenge's 250 worlds: a quarter, half and three quarters do not exceed these figures."""
+
+
+def quartiles(worlds: Sequence[BarnWorld]) -> NDArray[np.float64]:
+    """Of the five measures, shape (3, 5)."""
+    found: NDArray[np.float64] = np.percentile([astuple(difficulty_of(one)) for one in worlds], (25, 50, 75), axis=0)
+    return found
+
+
+@pytest.mark.thorough
+def test_our_own_worlds_are_as_hard_as_those_of_barn() -> None:
+    """Within 6 %: of 50 of BARN's worlds, drawn at random, half are off by more than 7 % in one of these figures."""
+    worlds = [made_world(seed) for seed in range(MADE)]
+    assert quartiles(worlds) == pytest.approx(QUARTILES_OF_BARN, rel=0.06)
+    beside_walls = np.mean([world.lattice[FIRST_ROW:, [1, -2]].mean() for world in worlds])
+    assert 0.35 < beside_walls < 0.55, "posts stand close to the walls: in BARN 0.42 of the cells there"
+
+
+def test_the_middle_one_of_a_few_of_our_worlds_is_as_hard_as_that_of_barn() -> None:
+    assert quartiles([made_world(seed) for seed in range(12)])[1] == pytest.approx(QUARTILES_OF_BARN[1], rel=0.12)
+
+
+@pytest.mark.thorough
+@needs_barn
+def test_barns_own_worlds_are_as_hard_as_is_said(worlds: list[BarnWorld]) -> None:
+    assert quartiles(worlds) == pytest.approx(QUARTILES_OF_BARN, rel=0.02)
+
+
+def test_a_world_without_a_way_is_refused_in_one_line() -> None:
+    shut = np.zeros((64, 30), np.bool_)
+    shut[50] = True
+    with pytest.raises(ExperimentError, match="world 7: no way from start to goal; leave it out of --worlds"):
+        difficulty_of(BarnWorld(7, shut, np.zeros((2, 2))))
 
 
 def test_a_rover_off_its_model_is_off_by_no_more_than_that() -> None:
@@ -116,7 +158,8 @@ def test_over_a_late_link_it_touches_nothing(worlds: list[BarnWorld], number: in
 
 @pytest.mark.thorough
 def test_points_take_more_than_twice_the_time_there() -> None:
-    motions, points = (drive(made_world(3), name, 0) for name in ("motion-ga", "points"))
+    motions, points = (drive(made_world(5), name, 0) for name in ("motion-ga", "points"))
+    assert points.end is RunEnd.REACHED
     assert motions.seconds < 0.5 * points.seconds
 
 
@@ -156,8 +199,9 @@ def test_title_and_page_say_what_is_driven(archive: Path | None, numbers: Sequen
         BarnRun("dwa", Setup.GUARDED, world.number, 0, RunEnd.REACHED, 6.0, 5.0, np.zeros((1, 2))) for world in worlds
     )
     report = BarnReport(Options(1, archive=archive), worlds, {(Setup.GUARDED, "dwa"): runs})
-    (table,) = report.tables()
+    hard, table = report.tables()
     assert str(table.title) == f"barn, guarded: {driven}"
+    assert str(hard.title) == f"barn: {driven.removesuffix(', 1 seed each')}, how hard they are"
     page = " ".join(report.section().split())
     assert f"{driven[0].upper()}{driven[1:]}. Protocol" in page
     assert "gets 72 distances, each the shortest of 10 rays" in page
