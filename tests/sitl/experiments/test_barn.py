@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from typer.testing import CliRunner
 
+from companion.core.footprint import Footprint
+from companion.mission.mission import Mission
+from companion.settings import Settings
 from sitl.cli.commands import app
+from sitl.experiments import barn
 from sitl.experiments.barn import (
     FASTEST,
     MADE,
@@ -34,6 +39,8 @@ from sitl.experiments.experiment import Advance, ExperimentError, Options
 from sitl.experiments.gates import GatesReport
 from sitl.experiments.off_model import off_model
 from sitl.plant.rover import SIM_ROVER
+from sitl.scenario import Scenario
+from sitl.sensors.range_sensors import SensorSuite
 from tests.support.shared_data import SHARED
 
 BARN = SHARED / "data" / "barn"
@@ -248,3 +255,49 @@ def test_a_file_that_is_no_archive_is_refused_in_one_line(tmp_path: Path, conten
         run(Options(1, controllers=("points",), setups=("strict",)), lambda done, total: None)
     with pytest.raises(ExperimentError, match="--controllers: 'best' is unknown"):
         run(Options(1, controllers=("best",)), lambda done, total: None)
+
+
+class FakeDrive:
+    """Stands in for a drive: what it was made from. Its rover has moved 0.1 m after 5 s and does not arrive."""
+
+    asked: ClassVar[list[FakeDrive]] = []
+
+    def __init__(
+        self, mission: Mission, scenario: Scenario, settings: Settings, seed: int, recorder: object,
+        limit_s: float, late_s: float,
+    ) -> None:  # fmt: skip
+        self.mission, self.scenario, self.settings, self.limit_s = mission, scenario, settings, limit_s
+        self.simulator = self.companion = self
+        self.time_s, self.done, self.collisions = 0.0, False, ()
+        self.truth = scenario.start
+        self.asked.append(self)
+
+    def tick(self) -> None:
+        self.time_s += 0.05
+        went_m = 0.0 if self.time_s < 2.0 else 0.09 if self.time_s < 5.0 else 0.11
+        self.truth = replace(self.scenario.start, north_m=self.scenario.start.north_m + went_m)
+
+
+@pytest.mark.parametrize("setup", list(Setup))
+def test_a_run_has_the_rover_the_lidar_and_the_limits_of_the_challenge(
+    monkeypatch: pytest.MonkeyPatch, setup: Setup
+) -> None:
+    """A Jackal of 0.508 x 0.430 m at 2 m/s, 270 degrees of 720 rays that reach 10 m, 100 s from when it has moved."""
+    monkeypatch.setattr(barn, "Drive", FakeDrive)
+    monkeypatch.setattr(FakeDrive, "asked", [])
+    one = drive(made_world(3), "motion-ga", 0, setup)
+    assert one.end is RunEnd.TIMEOUT and one.seconds == pytest.approx(100.0, abs=0.2)
+    (asked,) = FakeDrive.asked
+    assert asked.time_s == pytest.approx(105.0, abs=0.2), "it counts from when the rover has moved"
+    assert asked.limit_s >= asked.time_s, "the drive itself does not end before"
+    rover, scenario = asked.mission.rover, asked.scenario
+    assert rover.cruise_speed_m_s == scenario.parameters["WP_SPEED"] == 2.0
+    assert rover.footprint == Footprint.rectangle(0.508, 0.430)
+    touches = scenario.outline
+    assert (touches.radius_m, touches.front_m, touches.rear_m, touches.half_width_m) == (0.0, 0.254, 0.254, 0.215)
+    assert isinstance(scenario.sensors, SensorSuite)
+    lidar = scenario.sensors.lidar
+    assert lidar is not None and (lidar.max_m, lidar.rate_hz) == (10.0, 20.0)
+    bearings_deg = np.degrees(lidar.bearings_rad())
+    assert bearings_deg.size == 720 and len(bearings_deg) <= 72, "what a message has room for"
+    assert (bearings_deg.min(), bearings_deg.max()) == pytest.approx((-135.0, 135.0), abs=0.5)
