@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from companion.control.braking import GUARD_SLACK_S
+from companion.control.following import GUARDED_S
 from companion.core.severity import TextSink
 from companion.executive.autopilot_mission import MissionChangeMonitor
 from companion.executive.mission_run import MissionRun
@@ -65,7 +67,7 @@ def make_monitors(
         BorderMonitor(run),
         gate,
         batteries,
-        GuardMonitor(notifier),
+        GuardMonitor(notifier, GUARDED_S - GUARD_SLACK_S),
         LidarTroubleMonitor(wired, notifier),
         LimitsMonitor(autopilot, live, notifier),
         MissionChangeMonitor(run.mission.stored, autopilot.downloads, notifier),

@@ -47,6 +47,8 @@ WITH_LATE = ("barn", "controllers", "gates", "killed-companion", "missions")
 DRIVES = ("barn", "controllers", "dead-companion", "driving", "gates", "killed-companion", "missions", "traffic")
 WITH_STATISTICS = ("barn", "gates", "killed-companion", "traffic", "wang-table4")
 WITH_GUARD = ("dead-companion", "killed-companion", "missions")
+RUNS, RUNS_OF_BARN = 100, 10
+"""Unless it is said; the second as the BARN challenge has it."""
 EXIT_FAILED = 3
 LINES = 10
 """Of progress, where there is no terminal for a bar."""
@@ -55,11 +57,13 @@ LINES = 10
 def experiment(
     name: Annotated[str, typer.Argument(metavar="NAME", help=f"One of: {', '.join(EXPERIMENTS)}.")],
     runs: Annotated[
-        int,
+        int | None,
         typer.Option(
-            min=1, help="Runs, with consecutive seeds, on each map or mission. kwasniewski-table1 makes at least 3."
+            min=1,
+            help="Runs, with consecutive seeds, on each map, mission or world; default: "
+            f"{RUNS}, for barn {RUNS_OF_BARN}. kwasniewski-table1 makes at least 3.",
         ),
-    ] = 100,
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the first run; the next ones are consecutive.")] = 0,
     jobs: Annotated[
         int, typer.Option(min=1, help="Processes (needs joblib). Results stay the same, but measured times get longer.")
@@ -77,7 +81,12 @@ def experiment(
         str, typer.Option(help="navigation, driving: names, separated by commas; default: all that apply.")
     ] = "",
     worlds: Annotated[
-        Path | None, typer.Option(help="barn: a file of BARN worlds (.npz); default: worlds of our own making.")
+        Path | None,
+        typer.Option(
+            help="barn: a file of BARN worlds (.npz; docs/worlds.md says how it is made). Driven is the challenge's "
+            "standard set of 50 worlds, or every world of a file that lacks some of them. Default: 50 worlds of our "
+            "own making."
+        ),
     ] = None,
     controllers: Annotated[
         str,
@@ -158,6 +167,7 @@ def experiment(
             if listed and not names_in(listed):
                 raise ExperimentError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
+        runs = runs or (RUNS_OF_BARN if name == "barn" else RUNS)
         options = Options(
             runs, seed, jobs, maps, tuple(world or ()), names_in(planners), worlds, names_in(controllers),
             names_in(setups), guard, off, late, keep, names_in(missions), _outline_m(outline), turning_radius,

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -24,6 +25,7 @@ from companion.settings import Settings
 from companion.settings.settings import CONTROLLERS
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.experiments import drawing
+from sitl.experiments.barn_measures import SPREAD_HEAD, difficulty_of, spread_rows
 from sitl.experiments.barn_worlds import GOAL_M, START_M, BarnWorld, made_world, read_worlds
 from sitl.experiments.experiment import (
     GUARD,
@@ -53,13 +55,13 @@ FASTEST, SLOWEST = 2.0, 8.0
 """The score counts a time between so many optimal times (since 2026; before, from 4 on)."""
 OLD_FASTEST = 4.0
 LIDAR = Lidar(3.75, -135.0 + 0.5 * 3.75, 0.06, 10.0, 20.0, 10, 72)
-"""270 degrees, 10 m, 720 rays; the nearest of ten each is told, because a MAVLink message has room for 72."""
+"""270 degrees, 10 m, 720 rays. A MAVLink message has room for 72 distances: each is the shortest of ten rays."""
 WARM_S = 60.0
 """So long the rover may take until it moves."""
 MADE = 50
 """So many worlds of our own making, if no file is given."""
-STANDARD_STEP, STANDARD_LAST = 6, 294
-"""The challenge's standard set: every sixth world up to this one."""
+STANDARD = range(0, 300, 6)
+"""The numbers of the challenge's standard set: every sixth world."""
 WORST = 10
 HEAD = ("controller", "runs", "reached", "contact", "timeout", "score", "old score", "t / OT")
 
@@ -204,9 +206,13 @@ class BarnReport(ExperimentReport):
         return super().section_name + "".join(f"-{one}" for one in self._others())
 
     def tables(self) -> list[Table]:
-        """One a setup, with a row a controller."""
-        worlds = f"{len(self.worlds)} worlds"
-        return [terminal_table(f"{NAME}, {one}: {worlds}", HEAD, self._rows(one, plain=True)) for one in self._setups()]
+        """How hard the worlds are, and one a setup, with a row a controller."""
+        driven = f"{self._driven()}, {_counted(self.options.runs, 'seed')} each"
+        rows = {one: self._rows(one, plain=True) for one in self._setups()}
+        return [
+            terminal_table(f"{NAME}: {self._driven()}, how hard they are", SPREAD_HEAD, self._spread),
+            *(terminal_table(f"{NAME}, {one}: {driven}", HEAD, own) for one, own in rows.items()),
+        ]
 
     def as_json(self) -> dict[str, object]:
         """Every run."""
@@ -216,6 +222,20 @@ class BarnReport(ExperimentReport):
             for run in runs
         ]
         return {"experiment": NAME, "seed": self.options.seed, "runs": runs}
+
+    @cached_property
+    def _spread(self) -> list[list[str]]:
+        """Of the worlds' measures."""
+        return spread_rows([difficulty_of(world) for world in self.worlds])
+
+    def _driven(self) -> str:
+        """Which worlds, in words."""
+        number, archive = len(self.worlds), self.options.archive
+        if archive is None:
+            return f"{_counted(number, 'world')} of our own making"
+        if is_standard(self.worlds):
+            return f"the standard set of {_counted(number, 'world')}"
+        return f"{_counted(number, 'world')} of {archive.name}, not the standard set"
 
     def _setups(self) -> list[Setup]:
         return [setup for setup in Setup if any(setup is one for one, _ in self.series)]
@@ -243,17 +263,26 @@ class BarnReport(ExperimentReport):
 
     def section(self) -> str:
         """See ``ExperimentReport``."""
-        kind = f"The worlds of `{self.options.archive.name}`" if self.options.archive else "Worlds of our own making"
+        driven = self._driven()
+        shown = min(WORST, len(self.series[self._best()]))
         tables = "\n\n".join(f"{_told(one)}:\n\n{markdown_table(HEAD, self._rows(one))}" for one in self._setups())
         others = " and ".join(self._others())
         return f"""## Narrow ground (BARN){others and f": {others}"}
 
 `{self.options.command(NAME)}`
 
-{kind}, {len(self.worlds)} of them, {self.options.runs} runs each: Jackal's outline (0.508 x 0.430 m), 2 m/s, a lidar
-of 270 degrees and 10 m, the protocol and score of the BARN challenge at ICRA. **In our simulator, not an entry.** In
-each run the rover's speed, lag and turn rate, and its limits of acceleration, braking and turning, are
+{driven[0].upper()}{driven[1:]}, {_counted(self.options.runs, "seed")} each.
+Protocol and score are those of the BARN challenge at ICRA. **In our simulator, not an entry.** The rover has a Jackal's
+outline (0.508 x 0.430 m) and drives at 2 m/s. Its lidar has 720 rays over 270 degrees that reach 10 m; the companion
+gets {LIDAR.sectors} distances, each the shortest of {LIDAR.rays} rays. In each run the rover's speed, lag and turn
+rate, and its limits of acceleration, braking and turning, are
 {self.options.mismatch}.
+
+How hard the worlds are, along the shortest way among the posts ([measures](worlds.md#worlds-from-seeds)); so many
+worlds have at most these figures:
+
+{markdown_table(SPREAD_HEAD, self._spread)}
+
 *score*: as counted since 2026, at most 0.5; *old score*: as before, at most 0.25; *t / OT*: mean time over the optimal
 time, of runs that reached the goal. In brackets: 95 % intervals, by resampling worlds.
 
@@ -261,8 +290,13 @@ time, of runs that reached the goal. In brackets: 95 % intervals, by resampling 
 
 ![The worst runs](images/{self.section_name}-worst.png)
 
-The {WORST} worst runs of `{self._best()[1]}`, the slowest or those that ended badly: the way it drove.
+The {_counted(shown, "worst run")} of `{self._best()[1]}` with the way it drove: first those that ended badly, then the
+slowest.
 """
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _told(setup: Setup) -> str:
@@ -324,9 +358,13 @@ def _picture(worlds: Sequence[BarnWorld], runs: Sequence[BarnRun]) -> Figure:
 
 def standard(worlds: Sequence[BarnWorld]) -> tuple[BarnWorld, ...]:
     """The challenge's standard set, or all worlds where a file does not have the whole of it."""
-    wanted = range(0, STANDARD_LAST + 1, STANDARD_STEP)
-    chosen = [world for world in worlds if world.number in wanted]
-    return tuple(chosen if len(chosen) == len(wanted) else worlds)
+    chosen = [world for world in worlds if world.number in STANDARD]
+    return tuple(chosen if is_standard(chosen) else worlds)
+
+
+def is_standard(worlds: Sequence[BarnWorld]) -> bool:
+    """Whether the numbers are those of the challenge's standard set."""
+    return sorted(world.number for world in worlds) == list(STANDARD)
 
 
 def run(options: Options, advance: Advance) -> BarnReport:

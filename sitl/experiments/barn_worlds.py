@@ -41,10 +41,12 @@ FAR_M = 15.6
 PATH_X_M, PATH_Y_M = -4.575, 5.075
 """Where step (0, 0) of a reference path lies."""
 ROWS, COLUMNS = 64, 30
-FIRST_ROW = 30
+FIRST_ROW = 34
 """The obstacles begin at this row of the lattice."""
-BODY_M = 0.27
-"""Our own worlds have a way for a disc of this radius."""
+BODY_M = 0.36
+"""Our own worlds have a way for a disc of this radius, as all of the challenge's have."""
+SHARES, ROUNDS = (0.15, 0.2, 0.25, 0.3), (2, 3, 4)
+"""How much of the lattice of our own worlds is filled at first, and how often it is smoothed."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -103,11 +105,12 @@ def read_worlds(file: Path) -> list[BarnWorld]:
 
 
 def made_world(seed: int) -> BarnWorld:
-    """A world of our own making: between 14 and 28 % of its middle filled, smoothed, and with a way through."""
+    """A world of our own making: share and rounds are drawn from the seed, then fillings until one has a way."""
     rng = np.random.default_rng([seed, 250])
     planner = make_planner("astar", PlannerSettings())
+    share, rounds = float(rng.choice(SHARES)), int(rng.choice(ROUNDS))
     while True:
-        lattice = _filled(rng)
+        lattice = _filled(rng, share, rounds)
         weights = _swollen(lattice)
         start, target = Cell(COLUMNS // 2, 20), Cell(COLUMNS // 2, ROWS + 15)
         found = planner.plan(PlanningProblem(weights, start, target), Budget(), np.random.default_rng(0)).path
@@ -117,20 +120,24 @@ def made_world(seed: int) -> BarnWorld:
             return BarnWorld(seed, lattice, middle_m.astype(np.float64))
 
 
-def _filled(rng: np.random.Generator) -> Lattice:
-    """The lattice with its walls; a cell stays filled where at least five of the nine round it are."""
+def _filled(rng: np.random.Generator, share: float, rounds: int) -> Lattice:
+    """The lattice with its walls: the cells between them are filled by chance with this share, then smoothed.
+
+    In each round an empty cell with five filled neighbours of eight is filled, and a filled cell with fewer than two is
+    emptied. The walls at the sides count as filled neighbours, what lies before the first and behind the last row as
+    empty ones.
+    """
+    middle = rng.random((ROWS - FIRST_ROW, COLUMNS - 2)) < share
+    rows, columns = middle.shape
+    for _ in range(rounds):
+        padded = np.pad(np.pad(middle, ((1, 1), (0, 0))), ((0, 0), (1, 1)), constant_values=True).astype(np.int8)
+        with_own = sum(padded[y : y + rows, x : x + columns] for y in range(3) for x in range(3))
+        middle = with_own >= np.where(middle, 3, 5)
+    # The frame counts columns to the left; a made world is stored as a file's would be.
     lattice = np.zeros((ROWS, COLUMNS), dtype=np.bool_)
-    middle = rng.random((ROWS - FIRST_ROW, COLUMNS)) < rng.uniform(0.14, 0.28)
-    for _ in range(int(rng.integers(1, 4))):
-        padded = np.pad(middle, 1)
-        near = sum(
-            padded[y : y + middle.shape[0], x : x + middle.shape[1]].astype(np.int8) for y in range(3) for x in range(3)
-        )
-        middle = (near >= 4) | (middle & (near >= 2))
-    lattice[FIRST_ROW:] = middle
+    lattice[FIRST_ROW:, 1:-1] = middle
     lattice[:, [0, -1]] = True
     lattice[0] = True
-    # The frame counts columns to the left; a made world is stored as a file's would be.
     return lattice
 
 

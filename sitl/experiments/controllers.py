@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import combinations
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.table import Table
 
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
@@ -45,6 +47,8 @@ TIME_LIMIT_S = 600.0
 ALL = "all"
 GROUNDS = (GroundKind.CLUTTER, GroundKind.ROOMS, GroundKind.YARD)
 SHORT = ("controller", "runs", "there", "touched", "refused", "pairs", "s", "points s", "ratio")
+PAIR_HEAD = ("first / second", "contacts: first", "second", "pairs", "first: mean s", "second: mean s", "ratio")
+SHORT_PAIR_HEAD = ("first / second", "touched: 1st", "2nd", "pairs", "1st: s", "2nd: s", "ratio")
 HEAD = ("controller", "runs", "reached", "contacts", "refused", "pairs", "mean s", "points s", "ratio")
 
 
@@ -109,8 +113,13 @@ class ControllersReport(ExperimentReport):
     drives: tuple[GroundDrive, ...]
 
     def tables(self) -> list[Table]:
-        """One for each kind of ground, and one for all."""
-        return [terminal_table(f"{NAME}: {one}", SHORT, without_intervals(self._rows(one))) for one in self._kinds()]
+        """One for each kind of ground, and one for all; the same of pairs, where there are any."""
+        return [
+            terminal_table(f"{NAME}: {kind}", head, without_intervals(rows))
+            for kind in self._kinds()
+            for head, rows in ((SHORT, self._rows(kind)), (SHORT_PAIR_HEAD, self._pair_rows(kind)))
+            if rows or head is SHORT
+        ]
 
     def as_json(self) -> dict[str, object]:
         """Every drive."""
@@ -121,14 +130,27 @@ class ControllersReport(ExperimentReport):
         return [*GROUNDS, ALL]
 
     def _rows(self, kind: str) -> list[list[str]]:
+        own = self._by_controller(kind)
+        return [_row(name, drives, own.get(POINTS, [])) for name, drives in own.items()]
+
+    def _pair_rows(self, kind: str) -> list[list[str]]:
+        """Each two controllers that plan motions."""
+        own = {name: drives for name, drives in self._by_controller(kind).items() if name != POINTS}
+        return [_pair_row(one, other, own[one], own[other]) for one, other in combinations(own, 2)]
+
+    def _by_controller(self, kind: str) -> dict[str, list[GroundDrive]]:
         own = [one for one in self.drives if kind in (ALL, one.kind)]
-        reference = {(one.kind, one.seed): one for one in own if one.controller == POINTS}
         names = dict.fromkeys(one.controller for one in own)
-        return [_row(name, [one for one in own if one.controller == name], reference) for name in names]
+        return {name: [one for one in own if one.controller == name] for name in names}
+
+    def _section_of(self, kind: str) -> str:
+        pairs = self._pair_rows(kind)
+        compared = f"\n\n{markdown_table(PAIR_HEAD, pairs)}" if pairs else ""
+        return markdown_table(HEAD, self._rows(kind)) + compared
 
     def section(self) -> str:
         """See ``ExperimentReport``."""
-        tables = "\n\n".join(f"{kind}:\n\n{markdown_table(HEAD, self._rows(kind))}" for kind in self._kinds())
+        tables = "\n\n".join(f"{kind}:\n\n{self._section_of(kind)}" for kind in self._kinds())
         return f"""## Planned motions against points
 
 `{self.options.command(NAME)}`
@@ -139,21 +161,16 @@ speed, lag, turn rate and limits are {self.options.mismatch}.
 `{POINTS}` drives on the way of `{REFERENCE_PLANNER}` on fields of {POINTS_RESOLUTION_M:g} m; the others plan motions,
 on the way of the navigator as shipped, with the guard on the autopilot. *refused*: setpoints that the last look
 replaced by a stop; *pairs*: grounds on which this controller and `{POINTS}` reach the goal; *mean s*, *points s*: their
-mean driving times there; *ratio*: the one over the other, in brackets its 95 % interval by resampling pairs.
+mean driving times there; *ratio*: the one over the other, in brackets its 95 % interval by resampling pairs. The second
+table of each kind of ground compares two controllers that plan motions in the same way: *pairs* are the grounds on
+which both reach the goal, contacts those on all grounds.
 
 {tables}
 """
 
 
-def _row(name: str, own: Sequence[GroundDrive], reference: dict[tuple[GroundKind, int], GroundDrive]) -> list[str]:
-    others = [reference.get((one.kind, one.seed)) for one in own]
-    pairs = np.array(
-        [
-            (one.seconds, other.seconds)
-            for one, other in zip(own, others, strict=True)
-            if other is not None and one.reached and other.reached
-        ]
-    ).reshape(-1, 2)
+def _row(name: str, own: Sequence[GroundDrive], reference: Sequence[GroundDrive]) -> list[str]:
+    pairs = _pairs(own, reference)
     row = [
         name,
         f"{len(own)}",
@@ -165,6 +182,20 @@ def _row(name: str, own: Sequence[GroundDrive], reference: dict[tuple[GroundKind
     if not len(pairs):
         return [*row, "-", "-", "-"]
     return [*row, f"{pairs[:, 0].mean():.1f}", f"{pairs[:, 1].mean():.1f}", ratio_with_interval(pairs)]
+
+
+def _pair_row(one: str, other: str, first: Sequence[GroundDrive], second: Sequence[GroundDrive]) -> list[str]:
+    pairs = _pairs(first, second)
+    means = ["-", "-"] if not len(pairs) else [f"{mean:.1f}" for mean in pairs.mean(axis=0)]
+    contacts = [f"{sum(drive.contacts for drive in own)}" for own in (first, second)]
+    return [f"{one} / {other}", *contacts, f"{len(pairs)}", *means, ratio_with_interval(pairs)]
+
+
+def _pairs(first: Sequence[GroundDrive], second: Sequence[GroundDrive]) -> NDArray[np.float64]:
+    """The seconds of both on the grounds where both reach the goal, shape (n, 2)."""
+    others = {(one.kind, one.seed): one for one in second if one.reached}
+    both = [(one, others[one.kind, one.seed]) for one in first if one.reached and (one.kind, one.seed) in others]
+    return np.array([(one.seconds, other.seconds) for one, other in both]).reshape(-1, 2)
 
 
 def run(options: Options, advance: Advance) -> ControllersReport:

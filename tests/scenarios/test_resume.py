@@ -11,6 +11,7 @@ import pytest
 
 from companion.checkpoint.resume import PreviousRun
 from companion.checkpoint.state_format import SavedState, decode_state
+from companion.control.model_estimate import ModelEstimate
 from companion.core.grid import Cell
 from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.mission import Mission, OnBlocked
@@ -18,6 +19,7 @@ from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action
 from companion.safety.mode_latch import Control
 from companion.safety.reasons import Doubt, WaitReason
+from companion.settings import parse_settings
 from companion.supervision.arming import LEFT_S
 from tests.scenarios.test_safety_pilot import hold_sticks
 from tests.support.quick import first_of
@@ -343,3 +345,23 @@ def test_a_disk_that_fails_is_told_once_and_the_mission_goes_on(tmp_path: Path) 
     rig.finish()
     assert rig.companion.outcome.complete
     assert sum("The state cannot be saved" in text for text in rig.texts()) == 1
+
+
+def test_how_the_rover_follows_is_not_forgotten(tmp_path: Path) -> None:
+    """From the first moment the companion that resumes knows what the one before had found."""
+    mission = yard(tmp_path, TWO)
+    motions = parse_settings({"guidance": {"controller": "motion-ga"}}, "here")
+    rig = Rig(mission, motions, late_s=UP_S, state=tmp_path / "state")
+    rig.until_driven(1.0)
+    before = rig.companion.mission_run.executor
+    assert before is not None
+    began = before.estimator.estimate.began
+    found = ModelEstimate(began, began._replace(dead_s=0.4, turn_gain=1.2), 2.5, 2.5, 2.5)
+    before.estimator.estimate = found
+    saved = state_in(tmp_path)
+    rig.until(lambda: state_in(tmp_path) != saved, 20.0)
+    kill_and_resume(rig, mission)
+    rig.until(lambda: rig.companion.mission_run.executor is not None, 20.0)
+    after = rig.companion.mission_run.executor
+    assert after is not None and after.estimator.estimate.known == found.known
+    assert after.estimator.estimate.figures.turn_gain > 1.1 and after.estimator.estimate.figures.dead_s > 0.35

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from companion.mission.load import load_mission
 from companion.recording.reader import load_record
-from companion.recording.recorder import Recorder
+from companion.recording.recorder import NullRecorder, Recorder
 from companion.safety.reasons import EndReason
-from companion.settings import Settings
+from companion.settings import Settings, parse_settings
+from sitl.cli.drive_outputs import print_summary
 from sitl.lockstep import Drive
 from sitl.scenario import simulated
 
@@ -49,3 +52,16 @@ def test_the_record_of_an_interrupted_drive_ends_with_a_whole_tick(tmp_path: Pat
     record = load_record(tmp_path / "run")
     assert record.complete and record.meta.end_reason is EndReason.STOPPED_BY_USER
     assert len(list(record.ticks())) > 50 and record.notes == []
+
+
+def test_a_drive_says_how_the_rover_followed_where_motions_were_planned() -> None:
+    mission = load_mission(MISSION)
+    texts = []
+    for controller in ("motion-ga", "points"):
+        settings = parse_settings({"guidance": {"controller": controller}}, "here")
+        drive = Drive(mission, simulated(mission, None), settings, 0, NullRecorder(), time_limit_s=60.0)
+        console = Console(file=StringIO(), width=120)
+        print_summary(drive.run(), console)
+        texts.append(console.file.getvalue())  # type: ignore[attr-defined]
+    assert "follows" in texts[0] and "m/s²" in texts[0]
+    assert "follows" not in texts[1]

@@ -14,6 +14,7 @@ from companion.control.braking import (
     farthest_m,
     fastest_blind_m_s,
     fastest_within_m,
+    for_guard,
     for_link,
     late,
     loop_latency_s,
@@ -86,3 +87,11 @@ def test_it_stands_beyond_a_place_by_a_share_of_the_distance_and_farther_if_it_r
     distance_m: float, speed_m_s: float, beyond_m: float
 ) -> None:
     assert overshoot_m(distance_m, speed_m_s, SETTINGS.guidance) == pytest.approx(beyond_m)
+
+
+def test_with_a_guard_what_is_told_must_be_safe_until_the_guard_has_acted() -> None:
+    """On the real firmware a guard of 300 ms had put HOLD after 317 ms: it looks every 20 ms, and the mode changes."""
+    lasts_s = for_guard(SETTINGS, 0.3).guidance.velocity_lasts_s
+    assert 0.3 + 0.02 + 0.017 < lasts_s < 0.4
+    assert for_guard(SETTINGS, 9.0).guidance.velocity_lasts_s == SETTINGS.guidance.velocity_lasts_s
+    assert for_guard(SETTINGS, None) is SETTINGS

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from companion.control.motion_controller import WEIGHTS as DRIVEN_WITH
 from companion.control.motion_kernels import (
     AS_AT_EDGE,
     BLOCKED_S,
@@ -260,3 +261,28 @@ def test_where_there_is_surely_room_no_look_is_needed(
     assert may_be_last(told_m_s, turn_rad_s, 2.0, 1.3, 0.03, margin_s, ground) is (exact_m >= 0.0)
     enough_m = spare_m(told_m_s, turn_rad_s, 2.0, 1.3, 0.03, margin_s, ground, -math.inf, 0.1)
     assert enough_m == exact_m or min(enough_m, exact_m) >= 0.1
+
+
+def test_a_child_begins_as_one_parent_and_ends_as_another() -> None:
+    """Nothing mutates: the knots before the cut are the mother's, the others the father's."""
+    motions = np.array([constant(0.2 * one, 0.1 * one) for one in range(6)])
+    ground = problem()
+    costs = np.array([cost_s(one, ground) for one in motions])
+    chances = np.ones((6, 10))
+    chances[:, :3] = 0.0, 0.99, 0.5
+    next_generation(motions, costs, 2, chances, np.zeros((6, 6, 2)), np.array([0.5, 0.8]), ground)
+    mother, father = motions[:2]
+    assert not np.array_equal(mother, father)
+    for child in motions[2:]:
+        assert np.array_equal(child[:3], mother[:3]) and np.array_equal(child[3:], father[3:])
+
+
+def test_a_wall_nearby_is_a_risk_with_the_weights_that_are_driven_with() -> None:
+    """It stands 0.25 m beside the rover: nearer than 0.4 m, farther than what must be kept. One in the open is none."""
+
+    def risk_s(wall: tuple[int, int, int, int]) -> float:
+        with_it = problem(wall)._replace(weights=DRIVEN_WITH)
+        without = with_it._replace(weights=DRIVEN_WITH._replace(risk=0.0))
+        return cost_s(constant(1.0), with_it) - cost_s(constant(1.0), without)
+
+    assert risk_s((25, 45, 55, 57)) > 0.1 and risk_s((25, 45, 60, 62)) == 0.0

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import pytest
+
+from companion.control.braking import for_guard
+from companion.control.following import GUARDED_S
 from companion.core.severity import Severity
 from companion.safety.guard_monitor import GuardMonitor
+from companion.settings import Settings
+from companion.vehicle.commands import StatusText
 from companion.vehicle.events import Event, GuardSeen, TextSeen
 from companion.vehicle.state import VehicleState, fold
+from tests.support.whole import Whole
 
 
 class Texts:
@@ -21,7 +29,7 @@ class Texts:
 def run(*events: tuple[float, Event | None]) -> list[str]:
     """What is said as these come in; None for a tick without an event."""
     texts, state = Texts(), VehicleState()
-    monitor = GuardMonitor(texts)
+    monitor = GuardMonitor(texts, 0.95)
     for now_s, event in events:
         if event is not None:
             state = fold(state, event)
@@ -53,3 +61,22 @@ def test_in_legs_of_auto_it_does_not_watch_and_counts_as_absent() -> None:
 
 def test_without_one_nothing_is_told() -> None:
     assert run((0.0, None), (5.0, TextSeen(5.0, 6, "hello"))) == []
+
+
+@pytest.mark.parametrize(("waits_s", "says"), [(0.95, "Guarded: "), (0.951, "A late guard: "), (3.0, "A late guard: ")])
+def test_a_guard_that_waits_long_is_not_called_guarded(waits_s: float, says: str) -> None:
+    (text,) = run((1.0, GuardSeen(1.0, waits_s, False)))
+    assert text.startswith(says) and f"HOLD {waits_s:g} s" in text
+    assert ("set SCR_USER1 to 950 or less" in text) is (says != "Guarded: ")
+
+
+@pytest.mark.parametrize(("waits_s", "says"), [(0.95, "Guarded: "), (1.0, "A late guard: ")])
+def test_what_is_said_is_the_rule_in_force(tmp_path: Path, waits_s: float, says: str) -> None:
+    """Said by the whole companion; a velocity that lasts longer than that is judged by the strict rule."""
+    whole = Whole(tmp_path)
+    whole.autopilot.events = [*whole.heard(), GuardSeen(whole.clock.time_s, waits_s, False)]
+    whole.companion.tick()
+    texts = [command.text for command in whole.autopilot.taken() if isinstance(command, StatusText)]
+    assert [text.startswith(says) for text in texts if "guard" in text.lower()] == [True]
+    lasts_s = for_guard(Settings(), waits_s).guidance.velocity_lasts_s
+    assert (lasts_s <= GUARDED_S) is (says == "Guarded: ")

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import astuple, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from typer.testing import CliRunner
 
+from companion.core.footprint import Footprint
+from companion.mission.mission import Mission
+from companion.settings import Settings
+from sitl.cli.commands import app
+from sitl.experiments import barn
 from sitl.experiments.barn import (
     FASTEST,
+    MADE,
     OLD_FASTEST,
     BarnReport,
     BarnRun,
@@ -22,10 +33,14 @@ from sitl.experiments.barn import (
     with_interval,
     worst,
 )
-from sitl.experiments.barn_worlds import BODY_M, START_M, BarnWorld, made_world, read_worlds
-from sitl.experiments.experiment import ExperimentError, Options
+from sitl.experiments.barn_measures import difficulty_of
+from sitl.experiments.barn_worlds import BODY_M, FIRST_ROW, START_M, BarnWorld, made_world, read_worlds
+from sitl.experiments.experiment import Advance, ExperimentError, Options
+from sitl.experiments.gates import GatesReport
 from sitl.experiments.off_model import off_model
 from sitl.plant.rover import SIM_ROVER
+from sitl.scenario import Scenario
+from sitl.sensors.range_sensors import SensorSuite
 from tests.support.shared_data import SHARED
 
 BARN = SHARED / "data" / "barn"
@@ -68,10 +83,48 @@ def test_its_worlds_are_where_the_challenge_has_them(worlds: list[BarnWorld]) ->
 def test_our_own_worlds_come_from_their_seed_and_have_a_way(seed: int) -> None:
     world, again = made_world(seed), made_world(seed)
     assert np.array_equal(world.lattice, again.lattice) and 5.0 < world.optimal_s < 9.0
-    share = world.lattice[30:, 1:-1].mean()
-    assert 0.02 < share < 0.4
+    share = world.lattice[FIRST_ROW:, 1:-1].mean()
+    assert 0.02 < share < 0.4 and not world.lattice[1:FIRST_ROW, 1:-1].any()
     ground = world.world()
     assert min(ground.clearance_m(float(y), float(x), 1.0) for x, y in world.path_m) > BODY_M - 0.1
+
+
+QUARTILES_OF_BARN = np.array(
+    [[0.51, 2.42, 3.46, 1.73, 1.01], [0.55, 2.71, 3.98, 2.01, 1.03], [0.66, 3.09, 4.04, 2.53, 1.06]]
+)
+"""Of the challenge's 250 worlds: a quarter, half and three quarters do not exceed these figures."""
+
+
+def quartiles(worlds: Sequence[BarnWorld]) -> NDArray[np.float64]:
+    """Of the five measures, shape (3, 5)."""
+    found: NDArray[np.float64] = np.percentile([astuple(difficulty_of(one)) for one in worlds], (25, 50, 75), axis=0)
+    return found
+
+
+@pytest.mark.thorough
+def test_our_own_worlds_are_as_hard_as_those_of_barn() -> None:
+    """Within 6 %: of 50 of BARN's worlds, drawn at random, half are off by more than 7 % in one of these figures."""
+    worlds = [made_world(seed) for seed in range(MADE)]
+    assert quartiles(worlds) == pytest.approx(QUARTILES_OF_BARN, rel=0.06)
+    beside_walls = np.mean([world.lattice[FIRST_ROW:, [1, -2]].mean() for world in worlds])
+    assert 0.35 < beside_walls < 0.55, "posts stand close to the walls: in BARN 0.42 of the cells there"
+
+
+def test_the_middle_one_of_a_few_of_our_worlds_is_as_hard_as_that_of_barn() -> None:
+    assert quartiles([made_world(seed) for seed in range(12)])[1] == pytest.approx(QUARTILES_OF_BARN[1], rel=0.12)
+
+
+@pytest.mark.thorough
+@needs_barn
+def test_barns_own_worlds_are_as_hard_as_is_said(worlds: list[BarnWorld]) -> None:
+    assert quartiles(worlds) == pytest.approx(QUARTILES_OF_BARN, rel=0.02)
+
+
+def test_a_world_without_a_way_is_refused_in_one_line() -> None:
+    shut = np.zeros((64, 30), np.bool_)
+    shut[50] = True
+    with pytest.raises(ExperimentError, match="world 7: no way from start to goal; leave it out of --worlds"):
+        difficulty_of(BarnWorld(7, shut, np.zeros((2, 2))))
 
 
 def test_a_rover_off_its_model_is_off_by_no_more_than_that() -> None:
@@ -112,7 +165,8 @@ def test_over_a_late_link_it_touches_nothing(worlds: list[BarnWorld], number: in
 
 @pytest.mark.thorough
 def test_points_take_more_than_twice_the_time_there() -> None:
-    motions, points = (drive(made_world(3), name, 0) for name in ("motion-ga", "points"))
+    motions, points = (drive(made_world(5), name, 0) for name in ("motion-ga", "points"))
+    assert points.end is RunEnd.REACHED
     assert motions.seconds < 0.5 * points.seconds
 
 
@@ -131,6 +185,51 @@ def test_intervals_and_the_worst() -> None:
     runs = [one(0, RunEnd.REACHED, 6.0), one(1, RunEnd.CONTACT, 2.0), one(2, RunEnd.REACHED, 50.0)]
     assert [run.world for run in worst(runs)] == [1, 2, 0]
     assert with_interval(runs, lambda run: run.score()) == "0.208 (0.000 to 0.500)"
+
+
+def numbered(numbers: Sequence[int]) -> tuple[BarnWorld, ...]:
+    """Worlds of which nothing but the number counts."""
+    return tuple(BarnWorld(number, np.zeros((64, 30), np.bool_), np.zeros((2, 2))) for number in numbers)
+
+
+@pytest.mark.parametrize(
+    ("archive", "numbers", "driven"),
+    [
+        (None, range(50), "50 worlds of our own making, 1 seed each"),
+        (Path("all.npz"), range(300), "the standard set of 50 worlds, 1 seed each"),
+        (Path("few.npz"), [0, 6, 7], "3 worlds of few.npz, not the standard set, 1 seed each"),
+    ],
+)
+def test_title_and_page_say_what_is_driven(archive: Path | None, numbers: Sequence[int], driven: str) -> None:
+    worlds = standard(numbered(numbers))
+    runs = tuple(
+        BarnRun("dwa", Setup.GUARDED, world.number, 0, RunEnd.REACHED, 6.0, 5.0, np.zeros((1, 2))) for world in worlds
+    )
+    report = BarnReport(Options(1, archive=archive), worlds, {(Setup.GUARDED, "dwa"): runs})
+    hard, table = report.tables()
+    assert str(table.title) == f"barn, guarded: {driven}"
+    assert str(hard.title) == f"barn: {driven.removesuffix(', 1 seed each')}, how hard they are"
+    page = " ".join(report.section().split())
+    assert f"{driven[0].upper()}{driven[1:]}. Protocol" in page
+    assert "gets 72 distances, each the shortest of 10 rays" in page
+    assert ("The 3 worst runs" if len(runs) == 3 else "The 10 worst runs") in page
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "runs"), [("barn", [], 10), ("gates", [], 100), ("barn", ["--runs", "3"], 3)]
+)
+def test_barn_has_ten_seeds_if_nothing_is_said(
+    monkeypatch: pytest.MonkeyPatch, name: str, given: list[str], runs: int
+) -> None:
+    asked: list[Options] = []
+
+    def quick(options: Options, advance: Advance) -> GatesReport:
+        asked.append(options)
+        return GatesReport(options, ())
+
+    monkeypatch.setattr(f"sitl.experiments.{name}.run", quick)
+    assert CliRunner().invoke(app, ["experiment", name, *given]).exit_code == 0
+    assert [one.runs for one in asked] == [runs]
 
 
 @pytest.mark.parametrize("shape", [(40, 20), (64,), (30, 64)])
@@ -156,3 +255,49 @@ def test_a_file_that_is_no_archive_is_refused_in_one_line(tmp_path: Path, conten
         run(Options(1, controllers=("points",), setups=("strict",)), lambda done, total: None)
     with pytest.raises(ExperimentError, match="--controllers: 'best' is unknown"):
         run(Options(1, controllers=("best",)), lambda done, total: None)
+
+
+class FakeDrive:
+    """Stands in for a drive: what it was made from. Its rover has moved 0.1 m after 5 s and does not arrive."""
+
+    asked: ClassVar[list[FakeDrive]] = []
+
+    def __init__(
+        self, mission: Mission, scenario: Scenario, settings: Settings, seed: int, recorder: object,
+        limit_s: float, late_s: float,
+    ) -> None:  # fmt: skip
+        self.mission, self.scenario, self.settings, self.limit_s = mission, scenario, settings, limit_s
+        self.simulator = self.companion = self
+        self.time_s, self.done, self.collisions = 0.0, False, ()
+        self.truth = scenario.start
+        self.asked.append(self)
+
+    def tick(self) -> None:
+        self.time_s += 0.05
+        went_m = 0.0 if self.time_s < 2.0 else 0.09 if self.time_s < 5.0 else 0.11
+        self.truth = replace(self.scenario.start, north_m=self.scenario.start.north_m + went_m)
+
+
+@pytest.mark.parametrize("setup", list(Setup))
+def test_a_run_has_the_rover_the_lidar_and_the_limits_of_the_challenge(
+    monkeypatch: pytest.MonkeyPatch, setup: Setup
+) -> None:
+    """A Jackal of 0.508 x 0.430 m at 2 m/s, 270 degrees of 720 rays that reach 10 m, 100 s from when it has moved."""
+    monkeypatch.setattr(barn, "Drive", FakeDrive)
+    monkeypatch.setattr(FakeDrive, "asked", [])
+    one = drive(made_world(3), "motion-ga", 0, setup)
+    assert one.end is RunEnd.TIMEOUT and one.seconds == pytest.approx(100.0, abs=0.2)
+    (asked,) = FakeDrive.asked
+    assert asked.time_s == pytest.approx(105.0, abs=0.2), "it counts from when the rover has moved"
+    assert asked.limit_s >= asked.time_s, "the drive itself does not end before"
+    rover, scenario = asked.mission.rover, asked.scenario
+    assert rover.cruise_speed_m_s == scenario.parameters["WP_SPEED"] == 2.0
+    assert rover.footprint == Footprint.rectangle(0.508, 0.430)
+    touches = scenario.outline
+    assert (touches.radius_m, touches.front_m, touches.rear_m, touches.half_width_m) == (0.0, 0.254, 0.254, 0.215)
+    assert isinstance(scenario.sensors, SensorSuite)
+    lidar = scenario.sensors.lidar
+    assert lidar is not None and (lidar.max_m, lidar.rate_hz) == (10.0, 20.0)
+    bearings_deg = np.degrees(lidar.bearings_rad())
+    assert bearings_deg.size == 720 and len(bearings_deg) <= 72, "what a message has room for"
+    assert (bearings_deg.min(), bearings_deg.max()) == pytest.approx((-135.0, 135.0), abs=0.5)

@@ -60,6 +60,23 @@ def test_times_are_compared_where_both_reach_the_goal() -> None:
     assert "0.500" in report.section()
 
 
+def test_two_that_plan_motions_are_compared_on_the_same_grounds() -> None:
+    """Not their means over other grounds: the second ground, which one did not reach, counts for neither."""
+    drives = (
+        made("points", 0, 80.0), made("points", 1, 80.0), made("points", 2, 80.0),
+        made("motion-ga", 0, 20.0), made("motion-ga", 1, 90.0), made("motion-ga", 2, 40.0),
+        made("dwa", 0, 40.0), made("dwa", 1, 50.0, reached=False, contacts=1), made("dwa", 2, 40.0),
+        made("mppi", 0, 20.0, reached=False), made("mppi", 1, 30.0, reached=False), made("mppi", 2, 9.0, reached=False),
+    )  # fmt: skip
+    report = ControllersReport(Options(runs=3), drives)
+    ga_dwa, ga_mppi, dwa_mppi = report._pair_rows(GroundKind.YARD)
+    assert ga_dwa == ["motion-ga / dwa", "0", "1", "2", "30.0", "40.0", "0.750 (0.500 to 1.000)"]
+    assert ga_mppi == ["motion-ga / mppi", "0", "0", "0", "-", "-", "-"] and dwa_mppi[0] == "dwa / mppi"
+    assert "| motion-ga / dwa | 0 | 1 | 2 | 30.0 | 40.0 | 0.750 (0.500 to 1.000) |" in report.section()
+    titles = [str(table.title) for table in report.tables()]
+    assert titles.count("controllers: yard") == 2 and titles.count("controllers: rooms") == 1
+
+
 def test_the_interval_holds_the_ratio_and_grows_with_scatter() -> None:
     rng = np.random.default_rng(1)
     base = rng.uniform(40.0, 80.0, 100)

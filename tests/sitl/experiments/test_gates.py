@@ -10,10 +10,12 @@ import pytest
 from typer.testing import CliRunner
 
 from companion.core.footprint import Footprint
+from companion.mission.mission import Mission
 from sitl.cli.commands import app
 from sitl.experiments import gates
 from sitl.experiments.experiment import Advance, Options
 from sitl.experiments.gates import FINE_M, OUTLINE, SIDE_M, GateDrive, GatesReport, drive, widths_m, world_of
+from sitl.scenario import Scenario
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 30.0, 60.0])
@@ -95,3 +97,33 @@ def test_without_a_terminal_progress_is_told_in_a_few_lines(monkeypatch: pytest.
     assert result.exit_code == 0
     lines = result.stderr.splitlines()
     assert len(lines) == 10 and lines[0] == "gates: 4 of 35" and lines[-1] == "gates: 35 of 35"
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 30.0, 60.0])
+def test_the_rover_meets_a_gate_that_is_turned_by_its_angle(monkeypatch: pytest.MonkeyPatch, angle_deg: float) -> None:
+    class Asked(Exception):
+        pass
+
+    def asked(mission: Mission, scenario: Scenario, *others: object, **more: object) -> None:
+        raise Asked(scenario.world)
+
+    monkeypatch.setattr(gates, "Drive", asked)
+    with pytest.raises(Asked) as seen:
+        drive("motion-ga", 1.0, angle_deg, 0)
+    (world,) = seen.value.args
+    aside_m = float(np.random.default_rng((0, 53)).uniform(-gates.ASIDE_M, gates.ASIDE_M))
+    assert np.array_equal(world.obstacles, world_of(1.0, angle_deg, aside_m).obstacles)
+
+
+def test_every_gate_is_driven_through_at_every_angle(monkeypatch: pytest.MonkeyPatch) -> None:
+    def quick(name: str, width_m: float, angle_deg: float, seed: int, *others: object) -> GateDrive:
+        return GateDrive(name, width_m, angle_deg, seed, True, 0, 9.0)
+
+    monkeypatch.setattr(gates, "drive", quick)
+    drives = gates.run(Options(runs=2), lambda done, of: None).drives
+    assert sorted((one.width_m, one.angle_deg, one.seed) for one in drives) == [
+        (width_m, angle_deg, seed)
+        for width_m in widths_m(OUTLINE)
+        for angle_deg in (0.0, 30.0, 60.0)
+        for seed in (0, 1)
+    ]

@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sitl.experiments.barn_worlds import BODY_M, FINE_M, GOAL_M, START_M, BarnWorld, read_worlds
+from sitl.experiments.barn_measures import difficulty_of
+from sitl.experiments.barn_worlds import read_worlds
 from sitl.generators.graded_posts import TIGHT_M, wanted_m
 from sitl.generators.kinds import Cylinders, GroundKind
 from sitl.generators.made_ground import made
-from sitl.generators.measures import Difficulty, measured
-from sitl.generators.shortest_way import cheapest_way, coarse, shortest_m, weights_with
+from sitl.generators.measures import Difficulty
 from tests.support.shared_data import SHARED
 
 BARN = SHARED / "data" / "barn" / "worlds.npz"
@@ -70,22 +70,10 @@ def median_of(measures: list[Difficulty]) -> Difficulty:
     return Difficulty(*np.median([astuple(one) for one in measures], axis=0).tolist())
 
 
-def measured_barn(barn: BarnWorld) -> Difficulty:
-    """Where its posts stand: from 4.5 to 9.6 m ahead; fields of 0.1 m."""
-    world, side_m = barn.world(), 0.1
-    weights = weights_with(coarse(world.obstacles, FINE_M, side_m), BODY_M, side_m)
-    start_m, goal_m = ((ahead_m, right_m - world.west_m) for right_m, ahead_m in (START_M, GOAL_M))
-    way_m = cheapest_way(weights, start_m, goal_m, side_m)
-    assert way_m is not None
-    way_m = way_m[(way_m[:, 0] > 4.5) & (way_m[:, 0] < 9.6)]
-    length_m = shortest_m(weights, (way_m[0, 0], way_m[0, 1]), (way_m[-1, 0], way_m[-1, 1]), side_m)
-    return measured(world.obstacles, FINE_M, way_m, length_m)
-
-
 @pytest.mark.thorough
 @pytest.mark.skipif(not BARN.is_file(), reason="no BARN worlds beside the checkout")
 def test_the_hardest_fields_are_at_least_as_hard_as_the_median_world_of_barn() -> None:
-    barn = median_of([measured_barn(one) for one in read_worlds(BARN)])
+    barn = median_of([difficulty_of(one) for one in read_worlds(BARN)])
     assert astuple(barn) == pytest.approx(astuple(BARN_MEDIAN), rel=0.02)
     ours = [made(GroundKind.CYLINDERS, seed, Cylinders(difficulty=1.0)).difficulty for seed in range(7)]
     assert_not_easier(median_of(ours), barn)
