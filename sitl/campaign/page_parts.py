@@ -31,7 +31,7 @@ th[aria-sort=descending]::after { content: " ▼"; }
 .filter { display: flex; flex-wrap: wrap; gap: .3rem .9rem; align-items: baseline; }
 .filter select { max-width: 14rem; } .filter[hidden] { display: none; }
 figure { margin: 1rem 0; background: #fff; padding: .5rem; display: inline-block; max-width: 100%; }
-img { max-width: 100%; height: auto; }
+img { max-width: 100%; height: auto; } figcaption { color: #444; font-size: .9em; }
 code { font-size: .85em; background: var(--soft); padding: .1rem .3rem; user-select: all; }
 """
 
@@ -63,11 +63,13 @@ def table(
 
 
 def picture(figure: Figure, what: str) -> str:
-    """``what``: in words, for those who do not see it."""
+    """``what``: in words, below it."""
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
     data = base64.b64encode(out.getvalue()).decode()
-    return f'<figure><img alt="{html.escape(what)}" src="data:image/png;base64,{data}"></figure>'
+    return (
+        f'<figure><img alt="" src="data:image/png;base64,{data}"><figcaption>{html.escape(what)}</figcaption></figure>'
+    )
 
 
 def document(title: str, parts: Iterable[str]) -> str:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignTable, run_count
+from sitl.campaign.heat_maps import MOST_PANELS, heat_maps
 from sitl.campaign.page_parts import document, picture, table
-from sitl.campaign.pictures import MOST_PANELS, heat_maps, times
+from sitl.campaign.pictures import times
 from sitl.campaign.policies import Policy
 from sitl.campaign.runs_table import runs_table
 from sitl.campaign.summary import HEAD, PAIR_HEAD, Runs, broken_counts, differences, rows, varied
@@ -45,15 +46,20 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
             table(("axis", "world", "value", "against", *PAIR_HEAD), pairs, range(4)),
         ]
     if any(result.complete for _, result in runs):
-        parts += ["<h2>Driving times</h2>", picture(times(campaign, runs), "driving times of complete runs")]
+        parts += [
+            "<h2>Driving times</h2>",
+            picture(times(campaign, runs), "Share of all runs that were complete within so long"),
+        ]
     maps = heat_maps(campaign, runs, source.resolve().parent)
     if maps:
         parts.append(
             "<h2>Where the time goes</h2><p>Seconds in each square of one metre where a run stayed "
-            "for a second or more: mean over the runs of each combination "
-            f"(the first {MOST_PANELS}), in the same colours.</p>"
+            f"for a second or more, of each combination (the first {MOST_PANELS}), in the same colours. A mission's "
+            "ground is the same in all its runs: the mean over them. Generated ground is another one for each seed: of "
+            "each kind the ground in the middle and the one with most time lost, which is driving time beyond the "
+            "bound, the mean over the combinations.</p>"
         )
-        parts += [picture(figure, f"where the time goes: {world}") for world, figure in maps]
+        parts += [picture(figure, what) for what, figure in maps]
     parts.append(runs_table(campaign, runs, source))
     return document(campaign.name, parts)
 
