@@ -25,9 +25,11 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
     """The whole page; it loads nothing."""
     axes = varied(campaign)
     pairs = [(one.axis, one.world, one.value, one.other, *one.cells) for one in differences(campaign, runs)]
+    count = run_count(campaign)
+    still = f" <b>Not all runs are done: {count - len(runs)} are left.</b>" if len(runs) < count else ""
     parts = [
         f"<h1>{html.escape(campaign.name)}</h1>",
-        f"<p>{len(runs)} of {run_count(campaign)} runs, seeds {campaign.seed} to {campaign.seed + campaign.runs - 1}. "
+        f"<p>{len(runs)} of {count} runs, seeds {campaign.seed} to {campaign.seed + campaign.runs - 1}.{still} "
         "Companion and simulator in lock-step. <i>complete</i>: every target reached and nothing touched, with its "
         "exact 95 % interval; <i>touched</i>: contacts while the rover moved; <i>run into</i>: it stood, and something "
         "that moves came along; <i>refused</i>: setpoints that the last look replaced by a stop; <i>mean s</i>, "

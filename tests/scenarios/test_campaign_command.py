@@ -74,6 +74,7 @@ def test_on_a_cluster_whose_worker_is_killed_the_figures_are_those_of_this_machi
             alone.send_signal(signal.SIGINT)
             code, _, err = finished(alone)
         assert code == 130 and "runs, kept in " in err and "Traceback" not in err
+        assert "Not all runs are done" in (here / "report.html").read_text()
         wait_until(lambda: len(lines_of(there)) >= 2)
         killed.kill()
         code, out, err = finished(run)
