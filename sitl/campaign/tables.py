@@ -1,8 +1,9 @@
-"""A campaign's runs as tables for other programs: CSV and Parquet, a row a run."""
+"""Runs as tables for other programs: CSV and Parquet, a row a run."""
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 
@@ -17,7 +18,11 @@ LEFT_OUT = ("dwelt", "ground")
 
 def write_csv(file: Path, runs: Runs) -> None:
     """A line a run. Raises OSError."""
-    records = records_of(runs)
+    write_records(file, records_of(runs))
+
+
+def write_records(file: Path, records: Sequence[Mapping[str, object]]) -> None:
+    """A line a record, as CSV; all have the same keys. Raises OSError."""
     with whole_file(file) as new, new.open("w", encoding="utf-8", newline="") as out:
         writer = csv.DictWriter(out, records[0].keys() if records else ["id"])
         writer.writeheader()

@@ -77,7 +77,8 @@ def campaign(
 ) -> None:
     """Drive every run of CAMPAIGN: worlds x planners x controllers x sensors x faults x settings x seeds.
 
-    Exit code 2: bad input; 3: a run ended with an error of the programs; 130: stopped, what is done is kept.
+    Exit code 2: bad input; 3: a run ended with an error of the programs; 130: stopped, what is done is kept
+    and reported.
     """
     try:
         _check_together(
@@ -116,7 +117,10 @@ def _check_together(given: Mapping[str, bool]) -> None:
 def drive_campaign(
     file: Path, out: Path | None, jobs: int, cluster: str | None = None, *, parquet: bool = False
 ) -> Runs:
-    """Drive what is left of a campaign and put everything out. Raises one of ``BAD_INPUT``."""
+    """Drive what is left of a campaign and put everything out. Raises one of ``BAD_INPUT``.
+
+    When it is stopped, what is done is put out; then StoppedError.
+    """
     if fault := statistics_fault("campaign"):
         raise CampaignError(fault)
     console = Console()
@@ -129,11 +133,18 @@ def drive_campaign(
         specs = list(specs_of(table))
         _say_what_there_is(store, specs)
         left = [spec for spec in specs if spec.id not in store.results]
+        stopped: StoppedError | None = None
         if left:
             check_all(left, folder)
-            _drive(console, left, store, digests, jobs, cluster)
+            try:
+                _drive(console, left, store, digests, jobs, cluster)
+            except StoppedError as error:
+                stopped = error
         runs = store.of(specs)
-        put_out(console, table, runs, file, place, parquet=parquet)
+        if runs:
+            put_out(console, table, runs, file, place, parquet=parquet)
+    if stopped is not None:
+        raise stopped
     errors = sum(result.outcome == ERROR for _, result in runs)
     if errors:
         ended = f"{number_of(errors, 'run')} ended with an error"
@@ -159,7 +170,7 @@ def _drive(
     jobs: int,
     cluster: str | None,
 ) -> None:
-    """All that is left. Ctrl-C ends it; what is done is kept."""
+    """All that is left. Ctrl-C ends it with StoppedError; what is done is kept."""
     if cluster is None:
         warm_up_all(left, digests.folder)
     before = len(store.results)

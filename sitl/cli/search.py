@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from rich.console import Console
 
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import writable, written
-from sitl.campaign.campaign_file import load_campaign
+from sitl.campaign.campaign_file import CampaignTable, load_campaign
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.workers import driven_here
@@ -20,8 +20,10 @@ from sitl.cli.runs import FILE, alone_in, check_all, number_of, progress, warm_u
 from sitl.search.found_file import counted_from, differences, write_find
 from sitl.search.goals import Goal
 from sitl.search.minimise import minimised
-from sitl.search.search import Find, first_bases, searched
+from sitl.search.search import Find, Generation, first_bases, searched
+from sitl.search.search_report import KeptFind, SearchResult, write_evaluations, write_search_report
 
+REPORT, CSV = "report.html", "evaluations.csv"
 MOST_KEPT = 20
 """Finds of one rule and combination are alike: the first is made small and written. No more than so many are."""
 
@@ -31,6 +33,8 @@ class _Driver:
 
     def __init__(self, store: RunStore, digests: Digests, jobs: int) -> None:
         self._store, self._digests, self._jobs = store, digests, jobs
+        self.asked = 0
+        """Runs that were asked for, also those that were kept before."""
         self.ended: Callable[[int], None] = lambda more: None
         """Called with 0 when a run has ended."""
 
@@ -40,6 +44,7 @@ class _Driver:
             with written(self._store.file):
                 self._store.add(spec, result)
             self.ended(0)
+        self.asked += len(specs)
         return [self._store.results[spec.id] for spec in specs]
 
 
@@ -49,7 +54,8 @@ class _Keeper:
     def __init__(self, file: Path, goal: Goal, place: Path, drive: _Driver) -> None:
         self._file, self._goal, self._place, self._drive = file, goal, place, drive
         self._kinds: set[tuple[str, str]] = set()
-        self._kept = self._wrong = 0
+        self._wrong = 0
+        self.kept: list[KeptFind] = []
 
     def take(self, found: Sequence[Find]) -> None:
         """Finds of the search. What goes wrong besides while one is made small is one more."""
@@ -60,18 +66,21 @@ class _Keeper:
             kind = find.rule.value, replace(find.base, seed=0).id
             if kind not in self._kinds:
                 self._kinds.add(kind)
-                if self._kept < MOST_KEPT:
+                if len(self.kept) < MOST_KEPT:
                     waiting += self._keep(find)
+
+    @property
+    def left_out(self) -> int:
+        """So many kinds were found when enough were made small."""
+        return max(0, len(self._kinds) - MOST_KEPT)
 
     def sum_up(self) -> None:
         """The last line."""
-        left_out = len(self._kinds) - self._kept
-        more = f"; no more than {MOST_KEPT} are made small, {left_out} were left out" if left_out else ""
+        more = f"; no more than {MOST_KEPT} are made small, {self.left_out} were left out" if self.left_out else ""
         told = f"{number_of(self._wrong, 'find')} of {number_of(len(self._kinds), 'kind')}{more}"
         typer.echo(told if self._wrong else "no run went wrong")
 
     def _keep(self, find: Find) -> list[Find]:
-        self._kept += 1
         what = f"{find.rule}: {find.base.world}, seed {find.base.seed}"
         if find.values:
             typer.echo(f"{what}: driven again with less that differs", err=True)
@@ -83,12 +92,14 @@ class _Keeper:
         target = folder / f"{least.rule}-{spec.id}.toml"
         with written(target):
             write_find(least, spec, target, f"rover-sitl campaign {self._file.name} --search {self._goal}")
+        kept = KeptFind(least, spec, target)
+        self.kept.append(kept)
         typer.echo(
             f"{least.rule}: {least.spec.world}, seed {spec.seed}, {result.led_by or spec.controller}: "
             f"{result.outcome}, touched {result.touched}, closest {result.clearance_m:g} m"
         )
         typer.echo(f"  differs: {differences(least)}")
-        typer.echo(f"  again: rover-sitl campaign {target} --replay {spec.id} --record out/run")
+        typer.echo(f"  again: {kept.command}")
         return besides
 
 
@@ -105,13 +116,42 @@ def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs:
         warm_up_all(bases, folder)
         drive = _Driver(store, digests, jobs)
         keeper, before = _Keeper(file, goal, place, drive), len(store.results)
-        try:
-            with progress(console, budget) as advance:
-                drive.ended = advance
-                for found, driven in searched(table, goal, budget, drive):
-                    advance(driven)
-                    keeper.take(found)
-        except KeyboardInterrupt:
+        generations: list[Generation] = []
+        ended = _search(console, searched(table, goal, budget, drive), budget, drive, keeper, generations)
+        if generations:
+            tries = drive.asked - sum(len(one.evaluations) for one in generations)
+            _put_out(table, SearchResult(goal, budget, generations, keeper.kept, keeper.left_out, tries, ended), place)
+        if not ended:
             kept = len(store.results) - before
-            raise StoppedError(f"{number_of(kept, 'run')}, kept in {store.file}; the same command goes on") from None
+            raise StoppedError(f"{number_of(kept, 'run')}, kept in {store.file}; the same command goes on")
         keeper.sum_up()
+
+
+def _search(
+    console: Console,
+    coming: Iterator[Generation],
+    budget: int,
+    drive: _Driver,
+    keeper: _Keeper,
+    generations: list[Generation],
+) -> bool:
+    """Take generations until there are no more, and append each; False: Ctrl-C has ended it."""
+    try:
+        with progress(console, budget) as advance:
+            drive.ended = advance
+            for generation in coming:
+                generations.append(generation)
+                advance(generation.cost)
+                keeper.take(generation.finds)
+    except KeyboardInterrupt:
+        return False
+    return True
+
+
+def _put_out(table: CampaignTable, result: SearchResult, place: Path) -> None:
+    """Report and table. Raises OutputError."""
+    with written(place / REPORT):
+        write_search_report(place / REPORT, table, result)
+    with written(place / CSV):
+        write_evaluations(place / CSV, result)
+    typer.echo(f"report: {place / REPORT}")

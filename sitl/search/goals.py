@@ -44,6 +44,16 @@ TOLD_TWICE = {**POLICIES, Goal.STUCK: Policy.ENDS}
 """The policy that a run breaks, too, when it shows a goal."""
 
 
+MEASURES = {
+    Goal.COLLISION: "closest distance, m",
+    Goal.CLEARANCE: "closest distance, m",
+    Goal.STUCK: "driving time over the bound, with a minus",
+    Goal.UNREACHABLE: "driving time over the bound, with a minus",
+    Goal.REFUSED: "closest distance in m, less 0.01 for each second",
+}
+"""What ``distance`` is of runs that do not show the goal."""
+
+
 def shows(goal: Goal, result: RunResult) -> bool:
     """Whether the run has done it. One that was not driven has done nothing."""
     if result.outcome in NOT_DRIVEN:

@@ -3,7 +3,7 @@
 It begins again and again: each start takes the campaign's next combination and seed, and ends when it has found what it
 looks for, or after ``GENERATIONS``. The same campaign and goal give the same search, whoever drives the runs.
 
-Nouns: find.
+Nouns: find, generation.
 """
 
 from __future__ import annotations
@@ -55,16 +55,46 @@ class Find:
         return shows(self.rule, result) if isinstance(self.rule, Goal) else self.rule in broken(result)
 
 
-def searched(campaign: CampaignTable, goal: Goal, budget: int, drive: Driven) -> Iterator[tuple[list[Find], int]]:
-    """What each generation has found, and how many runs it was, until ``budget`` runs are driven and no more.
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """A run of a generation. ``distance``: how far from what is looked for; the less, the nearer."""
+
+    spec: RunSpec
+    result: RunResult
+    distance: float
+    finds: tuple[Find, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Generation:
+    """Runs that were drawn together. ``start`` and ``number`` (within the start) count from 1."""
+
+    start: int
+    number: int
+    base: RunSpec
+    evaluations: tuple[Evaluation, ...]
+
+    @property
+    def finds(self) -> list[Find]:
+        """Of all its runs."""
+        return [find for one in self.evaluations for find in one.finds]
+
+    @property
+    def cost(self) -> int:
+        """Of the budget: a generation without any run that can be driven must not go on for ever."""
+        return max(len(self.evaluations), 1)
+
+
+def searched(campaign: CampaignTable, goal: Goal, budget: int, drive: Driven) -> Iterator[Generation]:
+    """Each generation when it is driven, until ``budget`` runs are driven and no more.
 
     Raises CampaignError if ``cma`` is not installed.
     """
     left = budget
     for number, base in enumerate(_bases(campaign)):
-        for found, driven in _one_start(campaign, goal, base, number, drive, left):
-            left -= driven
-            yield found, driven
+        for generation in _one_start(campaign, goal, base, number, drive, left):
+            left -= generation.cost
+            yield generation
         if left <= 0:
             return
 
@@ -81,28 +111,32 @@ def _bases(campaign: CampaignTable) -> Iterator[RunSpec]:
 
 
 def _one_start(
-    campaign: CampaignTable, goal: Goal, base: RunSpec, number: int, drive: Driven, left: int
-) -> Iterator[tuple[list[Find], int]]:
-    """Finds and number of runs of each generation; the last one is cut off where no more than ``left`` are left."""
+    campaign: CampaignTable, goal: Goal, base: RunSpec, start: int, drive: Driven, left: int
+) -> Iterator[Generation]:
+    """Its generations; the last one is cut off where no more than ``left`` runs are left."""
     genes = genes_of(campaign, base)
-    optimiser = _optimiser(genes, base, number)
-    for _ in range(GENERATIONS):
+    optimiser = _optimiser(genes, base, start)
+    for number in range(1, GENERATIONS + 1):
         asked = optimiser.ask()
         values = [_values(genes, shares) for shares in asked]
         specs = [spec_with(base, genes, one) for one in values]
-        possible = [spec for spec in specs if _is_possible(spec)]
-        driven = possible[:left]
+        possible = [(spec, one) for spec, one in zip(specs, values, strict=True) if _is_possible(spec)][:left]
+        driven = [spec for spec, _ in possible]
         results = dict(zip((spec.id for spec in driven), drive(driven), strict=True))
-        told = [results.get(spec.id) for spec in specs]
-        pairs = [(one, result) for one, result in zip(values, told, strict=True) if result is not None]
-        found = [find for one, result in pairs for find in finds_in(goal, base, genes, one, result)]
-        left -= max(len(driven), 1)  # a generation without any run that can be driven must not go on for ever
-        yield found, max(len(driven), 1)
-        if left <= 0 or any(find.rule == goal for find in found):
+        evaluations = tuple(_evaluated(goal, base, genes, one, results[spec.id]) for spec, one in possible)
+        generation = Generation(start + 1, number, base, evaluations)
+        left -= generation.cost
+        yield generation
+        if left <= 0 or any(find.rule == goal for find in generation.finds):
             return
-        optimiser.tell(asked, [_distance(goal, result) for result in told])
+        optimiser.tell(asked, [_distance(goal, results.get(spec.id)) for spec in specs])
         if optimiser.stop():
             return
+
+
+def _evaluated(goal: Goal, base: RunSpec, genes: tuple[Gene, ...], values: Values, result: RunResult) -> Evaluation:
+    finds = tuple(finds_in(goal, base, genes, values, result))
+    return Evaluation(spec_with(base, genes, values), result, _distance(goal, result), finds)
 
 
 def finds_in(goal: Goal, base: RunSpec, genes: tuple[Gene, ...], values: Values, result: RunResult) -> list[Find]:

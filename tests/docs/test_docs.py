@@ -28,6 +28,7 @@ from companion.cli.service import ALIVE_S
 from companion.mission.sensor_tables import BeamTable, LidarTable, ProximityTable, SensorsTable, SunTable
 from companion.settings import parse_settings
 from sitl.campaign.campaign_file import load_campaign, run_count
+from sitl.campaign.run_spec import specs_of
 from sitl.faults.fault_file import load_faults
 from sitl.sensors.suites import suite_of
 from sitl.world.world_file import DoorTable, ObstacleTable, RoughTable, SlipperyTable, WorldTable, load_world
@@ -320,6 +321,12 @@ def test_the_service_is_one_that_systemd_takes_and_the_program_understands(tmp_p
         path.write_text(text.replace(program, "/bin/true"))
         done = subprocess.run([analyze, "verify", path], capture_output=True, text=True, timeout=60, check=False)
         assert str(path) not in done.stderr and "rover-companion.service:" not in done.stderr, done.stderr
+
+
+def test_the_run_that_the_page_on_campaigns_drives_again_exists() -> None:
+    text = (ROOT / "docs" / "campaigns.md").read_text("utf-8")
+    ((file, run_id),) = re.findall(r"rover-sitl campaign (\S+) --replay (\w+)", text)
+    assert run_id in {spec.id for spec in specs_of(load_campaign(ROOT / file))}
 
 
 GENERATED_PAGES = {"results.md", "benchmarks.md"}

@@ -74,6 +74,7 @@ def test_on_a_cluster_whose_worker_is_killed_the_figures_are_those_of_this_machi
             alone.send_signal(signal.SIGINT)
             code, _, err = finished(alone)
         assert code == 130 and "runs, kept in " in err and "Traceback" not in err
+        assert "Not all runs are done" in (here / "report.html").read_text()
         wait_until(lambda: len(lines_of(there)) >= 2)
         killed.kill()
         code, out, err = finished(run)
@@ -165,14 +166,15 @@ def test_a_search_finds_makes_small_and_writes_what_drives_the_same_again(tmp_pa
     assert result.exit_code == 0, result.output
     (found,) = (out / "search-collision" / "found").glob("collision-*.toml")
     told = result.stdout.splitlines()
-    assert told[-4].startswith("collision: behind.toml, seed 0, points: collision, touched")
-    assert told[-3] == "  differs: nothing"
-    assert told[-2] == f"  again: rover-sitl campaign {found} --replay {found.stem[-12:]} --record out/run"
+    assert told[-5].startswith("collision: behind.toml, seed 0, points: collision, touched")
+    assert told[-4] == "  differs: nothing"
+    run_id = found.stem[-12:]
+    assert told[-3] == f"  again: rover-sitl campaign {found} --replay {run_id} --record out/{run_id}"
     assert told[-1].endswith(" of 1 kind")
     number = len(lines_of(out / "search-collision"))
 
     again = CliRunner().invoke(app, command, env={"COLUMNS": "200"})
-    assert again.stdout.splitlines()[-4:] == told[-4:], "the same search"
+    assert again.stdout.splitlines()[-5:] == told[-5:], "the same search"
     assert len(lines_of(out / "search-collision")) == number, "nothing is driven twice"
 
     replayed = CliRunner().invoke(

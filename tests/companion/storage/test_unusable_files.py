@@ -238,6 +238,7 @@ OPENED_OTHERWISE = {
     "sitl/cli/runs.py": "a folder, to lock it",
     "sitl/campaign/run_store.py": "written only, after refuse_pipe",
     "sitl/campaign/tables.py": "written only, after refuse_pipe",
+    "sitl/campaign/runs_table.py": "the program's own files",
 }
 
 

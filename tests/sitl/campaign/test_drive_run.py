@@ -11,6 +11,7 @@ from sitl.campaign import drive_run
 from sitl.campaign.drive_run import drive
 from sitl.campaign.policies import Policy, broken
 from sitl.campaign.run_spec import RunSpec
+from sitl.experiments.time_bound import ways_m
 from sitl.generators.made_ground import made
 from sitl.generators.measures import Difficulty
 from sitl.lockstep import Drive, TrackPoint
@@ -65,6 +66,20 @@ def test_a_run_tells_how_difficult_its_ground_was_and_works_it_out_once(monkeypa
 def test_the_ground_of_a_run_is_that_of_its_seed() -> None:
     result = drive(replace(SPEC, time_limit_s=1.0), Path())
     assert result.ground == made("maze", 1).difficulty and result.outcome == "time limit"
+
+
+def test_the_bound_of_a_run_is_that_of_its_own_ground(tmp_path: Path) -> None:
+    """Of each seed another one, with the same mission across; a mission's own is the same whatever the seed."""
+    (tmp_path / "far.toml").write_text("[[target]]\nnorth_m = 0.0\neast_m = 30.0\n")
+    spec = replace(SPEC, time_limit_s=46.0)  # the autopilot's start-up takes 43 s
+    cruise_m_s = drive_run.mission_of(spec, Path()).rover.cruise_speed_m_s
+    for seed in (1, 2):
+        ground, (_, scenario) = made("maze", seed), drive_run._mission_and_scenario(replace(spec, seed=seed), Path())
+        (way_m,) = ways_m(scenario, [ground.start_m, ground.goal_m]) or [0.0]
+        assert way_m > 38.0
+        assert drive(replace(spec, seed=seed), Path()).bound_s == pytest.approx(way_m / cruise_m_s, abs=0.3)
+    bounds_s = [drive(replace(spec, world="far.toml", seed=seed), tmp_path).bound_s for seed in (1, 2)]
+    assert bounds_s == pytest.approx([30.0 / cruise_m_s] * 2, abs=0.05)
 
 
 def test_settings_of_a_run_have_its_planner_its_controller_and_its_variant() -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
 from companion.cli.entry import StoppedError
-from sitl.campaign.run_spec import RunResult, RunSpec
+from sitl.campaign.campaign_file import load_campaign
+from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
 from sitl.cli import search
 from sitl.search.goals import Goal
 
@@ -59,6 +61,27 @@ def test_a_stop_after_the_first_find_leaves_it_written(campaign: Path, monkeypat
     with pytest.raises(StoppedError, match="13 runs, kept in"):
         search.search_campaign(campaign, Goal.COLLISION, 40, campaign.parent / "out", 1)
     assert found(campaign) == ["collision", "refused"]
+    report = (campaign.parent / "out" / "search-collision" / "report.html").read_text()
+    assert "The search was stopped" in report and report.count(" --replay ") == 2
+
+
+def test_report_and_table_tell_how_the_search_went_and_what_drives_finds_again(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(search, "driven_here", Drives(10_000))
+    search.search_campaign(campaign, Goal.COLLISION, 40, campaign.parent / "out", 1)
+    place = campaign.parent / "out" / "search-collision"
+    report = (place / "report.html").read_text()
+    assert "40 of 40 runs in " in report and "was stopped" not in report and "data:image/png" in report
+    for file in (place / "found").glob("*.toml"):
+        run_id = file.stem.rpartition("-")[2]
+        assert f"rover-sitl campaign {file} --replay {run_id} --record out/{run_id}" in report
+        assert run_id in {spec.id for spec in specs_of(load_campaign(file))}
+    with (place / "evaluations.csv").open(newline="") as table:
+        rows = list(csv.DictReader(table))
+    assert [int(row["evaluation"]) for row in rows] == list(range(1, 41))
+    assert [row["start"] for row in rows] == sorted((row["start"] for row in rows), key=int)
+    assert all(row["distance"] == "-100.0" and "collision" in row["shows"].split() for row in rows)
 
 
 def test_no_more_than_so_many_are_made_small(
@@ -68,4 +91,6 @@ def test_no_more_than_so_many_are_made_small(
     monkeypatch.setattr(search, "MOST_KEPT", 3)
     search.search_campaign(campaign, Goal.COLLISION, 40, campaign.parent / "out", 1)
     assert len(found(campaign)) == 3
+    report = (campaign.parent / "out" / "search-collision" / "report.html").read_text()
+    assert "1 more kinds were left out" in report
     assert capsys.readouterr().out.splitlines()[-1].endswith("; no more than 3 are made small, 1 were left out")

@@ -41,9 +41,9 @@ def made_up(specs: Sequence[RunSpec]) -> list[RunResult]:
 
 def finds_of(budget: int) -> tuple[list[Find], int]:
     finds, driven = [], 0
-    for found, number in searched(CAMPAIGN, Goal.COLLISION, budget, made_up):
-        finds += found
-        driven += number
+    for generation in searched(CAMPAIGN, Goal.COLLISION, budget, made_up):
+        finds += generation.finds
+        driven += len(generation.evaluations)
     return finds, driven
 
 
@@ -80,7 +80,7 @@ def test_the_budget_is_kept_to_the_run(budget: int) -> None:
         asked.extend(specs)
         return [RunResult("points", "reached", 1, 1, seconds=50.0, clearance_m=1.0) for _ in specs]
 
-    driven = sum(number for _, number in searched(CAMPAIGN, Goal.COLLISION, budget, counting))
+    driven = sum(one.cost for one in searched(CAMPAIGN, Goal.COLLISION, budget, counting))
     assert driven == len(asked) == budget
 
 
@@ -179,5 +179,5 @@ def test_rules_that_are_broken_besides_are_finds_too() -> None:
     def failing(specs: Sequence[RunSpec]) -> list[RunResult]:
         return [RunResult("points", "reached", 1, 1, refused=1, seconds=9.0, clearance_m=1.0) for _ in specs]
 
-    found, _ = next(searched(CAMPAIGN, Goal.COLLISION, 10, failing))
+    found = next(searched(CAMPAIGN, Goal.COLLISION, 10, failing)).finds
     assert {find.rule for find in found} == {Policy.NOTHING_REFUSED}
