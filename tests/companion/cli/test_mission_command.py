@@ -162,7 +162,7 @@ def test_it_checks_with_the_settings_that_the_mission_is_to_be_driven_with(tmp_p
     settings.write_text('[guidance]\ncontroller = "motion-ga"\n')
     assert "gaps of 1.9 m or more; with single beams" in checked(mission) and "in --settings" in checked(mission)
     planned = checked(mission, "--settings", str(settings))
-    assert "gaps of 1.1 m or more; with single beams alone of 1 m, for 3.0 m" in planned and "--settings" not in planned
+    assert "gaps of 0.8 m or more; with single beams alone of 1 m, for 3.0 m" in planned and "--settings" not in planned
     mission.write_text(mission.read_text() + '[sitl]\nsensors = "beams"\n')
     assert "fields of 1 m (as single beams need)" in checked(mission, "--settings", str(settings))
     nowhere = CliRunner().invoke(app, ["mission", "check", str(mission), "--settings", str(tmp_path / "no.toml")])

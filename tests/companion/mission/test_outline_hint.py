@@ -14,7 +14,7 @@ def long_rover(length_m: float = 1.2, turning_radius_m: float = 0.0) -> RoverSpe
 
 def test_a_long_rover_is_told_how_much_narrower_gaps_may_be() -> None:
     text = outline_hint(long_rover())
-    assert "gaps of 1.9 m or more" in text and '"motion-ga"' in text and "through 1.1 m" in text
+    assert "gaps of 1.9 m or more" in text and '"motion-ga"' in text and "through 0.8 m" in text
 
 
 def test_nobody_is_told_for_whom_it_changes_nothing() -> None:
