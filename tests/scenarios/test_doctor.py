@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -328,7 +329,7 @@ def test_a_rover_that_is_not_believed_has_been_heard(
 
 
 def test_nobody_there(tmp_path: Path) -> None:
-    url = f"udpin:127.0.0.1:{free_port()}"
+    url = f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
     answer = CliRunner().invoke(app, ["doctor", "--connect", url, "--seconds", "1", "--state", str(tmp_path)])
     assert answer.exit_code == 4
     assert "Nothing is heard" in answer.output
@@ -337,7 +338,7 @@ def test_nobody_there(tmp_path: Path) -> None:
 def test_how_the_rover_followed_in_the_last_run_is_among_the_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     estimate: ModelEstimate | None = ModelEstimate(Following(), Following(turn_gain=1.25), 60.0, 60.0, 60.0)
     monkeypatch.setattr("companion.cli.doctor.last_estimate", lambda directory: estimate)
-    ask = ["doctor", "--connect", f"udpin:127.0.0.1:{free_port()}", "--seconds", "1", "--json"]
+    ask = ["doctor", "--connect", f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}", "--seconds", "1", "--json"]
     followed = json.loads(CliRunner().invoke(app, ask).output)["followed"]
     assert (followed["known"], followed["turn_gain"], followed["dead_s"]) == (1.0, 1.25, 0.3)
     estimate = ModelEstimate(Following(), Following())
@@ -347,7 +348,7 @@ def test_how_the_rover_followed_in_the_last_run_is_among_the_figures(monkeypatch
 @pytest.mark.parametrize("warm", [True, False])
 def test_kernels_that_are_not_compiled_are_told_of(monkeypatch: pytest.MonkeyPatch, warm: bool) -> None:
     monkeypatch.setattr("companion.cli.doctor.kernels_warm", lambda settings: warm)
-    url = f"udpin:127.0.0.1:{free_port()}"
+    url = f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
     answer = CliRunner().invoke(app, ["doctor", "--connect", url, "--seconds", "1", "--json"])
     names = [one["name"] for one in json.loads(answer.output)["findings"]]
     assert names == ["no-autopilot", *([] if warm else ["kernels-cold"])]

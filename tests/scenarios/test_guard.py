@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import socket
 from dataclasses import replace
 from pathlib import Path
 
@@ -103,7 +104,7 @@ def test_nobody_there_and_a_place_that_cannot_be_written_are_told_in_a_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("companion.cli.guard.HEARD_S", 0.5)
-    nobody = CliRunner().invoke(app, ["guard", "--install", f"udpin:127.0.0.1:{free_port()}"])
+    nobody = CliRunner().invoke(app, ["guard", "--install", f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}"])
     assert nobody.exit_code == 4 and "no rover was heard; check link and port" in nobody.output
     nowhere = CliRunner().invoke(app, ["guard", "--write", str(tmp_path / "file" / ".." / "..")])
     assert nowhere.exit_code == 2 and len(nowhere.output.strip().splitlines()) == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -97,7 +98,7 @@ def test_compared_with_the_rover(tmp_path: Path) -> None:
 
 def test_nobody_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("companion.cli.params.HEARD_S", 0.3)
-    answer = params("--check", "--connect", f"udpin:127.0.0.1:{free_port()}", "--state", tmp_path)
+    answer = params("--check", "--connect", f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}", "--state", tmp_path)
     assert answer.exit_code == 4 and "no rover is heard" in answer.output
 
 
