@@ -36,8 +36,11 @@ CHANGES = (0.03, -0.03, 0.1, -0.1)
 """The other figures are tried with so much more or less."""
 FIGURES = ("acceleration_m_s2", "deceleration_m_s2", "turn_acceleration_rad_s2", "turn_gain")
 TELLS_S = 0.4
-"""The first three stay as they are while the last seconds hold less than this of gathering speed, of braking, of
-changing the turn rate: drawn to what it began with, a figure would forget what was found."""
+"""They stay as they are while the last seconds hold less than this of gathering speed, of braking, of changing the turn
+rate, of turning steadily: drawn to what it began with, a figure would forget what was found."""
+STEADY_S, STEADY_RAD_S, LEAST_RAD_S = 0.3, 0.3, 0.3
+"""A turn is steady where the turn rate told is at least the last of these, and has changed by less than the second for
+the first. Told one way and the other in turn, a rover seems to turn less than it does, as what is seen is late."""
 LEAST_SHARE, MOST_SHARE = 0.5, 2.0
 """No figure leaves these bounds, of what it began with."""
 ERROR_M_S, ERROR_RAD_S = 0.1, 0.15
@@ -53,12 +56,14 @@ POOR_FIT = 2.0
 
 
 class Fit(NamedTuple):
-    """How well figures fit: mean squared difference, and seconds of gathering speed, of braking, of turning more."""
+    """How well figures fit: mean squared difference, and seconds of gathering speed, of braking, of changing the turn
+    rate, of turning steadily."""
 
     error: float
     gathers_s: float
     brakes_s: float
     turns_s: float
+    steady_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +153,7 @@ def _fitted(before: ModelEstimate, rows: NDArray[np.float64]) -> ModelEstimate:
         if (error := _error(tried, began, rows)) < least:
             best, least = tried, error
     in_window = Fit(*fit_of(best, rows, -math.inf))
-    told_s = (in_window.gathers_s, in_window.brakes_s, in_window.turns_s, math.inf)
+    told_s = (in_window.gathers_s, in_window.brakes_s, in_window.turns_s, in_window.steady_s)
     for name, tells_s in zip(FIGURES, told_s, strict=True):
         if tells_s < TELLS_S:
             continue
@@ -187,7 +192,8 @@ def fit_of(figures, rows, since_s):
     ``since_s``: the three kinds of motion are counted from then on.
     """
     speed, turn, at, counted = rows[0, 3], rows[0, 4], 0, 0
-    error = gathers_s = brakes_s = turns_s = 0.0
+    error = gathers_s = brakes_s = turns_s = steady_s = 0.0
+    held, held_s = rows[0, 2], rows[0, 0]
     for row in range(1, rows.shape[0]):
         now_s, step_s = rows[row, 0], rows[row, 0] - rows[row - 1, 0]
         while at + 1 < row and rows[at + 1, 0] <= now_s - figures.dead_s:
@@ -201,7 +207,11 @@ def fit_of(figures, rows, since_s):
         slows = change * speed < 0.0
         most = (figures.deceleration_m_s2 if slows else figures.acceleration_m_s2) * step_s
         most_turn = figures.turn_acceleration_rad_s2 * step_s
+        if abs(rows[at + 1, 2] - held) > STEADY_RAD_S:
+            held, held_s = rows[at + 1, 2], now_s
         if now_s > since_s:
+            if abs(held) > LEAST_RAD_S and now_s - held_s > STEADY_S:
+                steady_s += step_s
             if abs(change) > most:
                 gathers_s += 0.0 if slows else step_s
                 brakes_s += step_s if slows else 0.0
@@ -211,4 +221,4 @@ def fit_of(figures, rows, since_s):
         turn += min(max(turned, -most_turn), most_turn)
         off, off_turn = (rows[row, 3] - speed) / ERROR_M_S, (rows[row, 4] - turn) / ERROR_RAD_S
         error += min(off * off, MOST_ERROR * MOST_ERROR) + min(off_turn * off_turn, MOST_ERROR * MOST_ERROR)
-    return error / max(counted, 1), gathers_s, brakes_s, turns_s
+    return error / max(counted, 1), gathers_s, brakes_s, turns_s, steady_s

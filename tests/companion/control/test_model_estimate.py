@@ -132,3 +132,20 @@ def test_what_was_found_stays_while_nothing_tells() -> None:
     kept = estimator.estimate.figures
     assert found.deceleration_m_s2 == pytest.approx(0.6, rel=0.2)
     assert kept[1:4] == found[1:4]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_turning_to_and_fro_tells_nothing_of_how_much_a_rover_turns(seed: int) -> None:
+    """It obeys sooner than any dead time that is tried: the fit of such turns is anything from half to 1.5 times."""
+    estimator = ModelEstimator(AS_SHIPPED._replace(turn_acceleration_rad_s2=20.0))
+    lately, rng, seen_rad_s, told = Told(), np.random.default_rng(seed), 0.0, GuidedVelocity(0.3, 0.0)
+    for tick in range(400):
+        now_s = tick * TICK_S
+        if tick % 2 == 0:
+            seen_rad_s = told.yaw_rate_rad_s
+        estimator.note(
+            LocalView(Pose(0.0, 0.0, 0.0, now_s), 0.3, EVIDENCE, LIMITS, SETTINGS, seen_rad_s, lately=lately)
+        )
+        told = GuidedVelocity(0.3, float(rng.uniform(-1.5, 1.5)))
+        lately = after(lately, told, now_s)
+    assert estimator.estimate.figures.turn_gain == 1.0
