@@ -40,7 +40,7 @@ TELLS_S = 0.4
 rate, of turning steadily: drawn to what it began with, a figure would forget what was found."""
 STEADY_S, STEADY_RAD_S, LEAST_RAD_S = 0.3, 0.3, 0.3
 """A turn is steady where the turn rate told is at least the last of these, and has changed by less than the second for
-the first. Told one way and the other in turn, a rover seems to turn less than it does, as what is seen is late."""
+the first. Told one way and the other several times a second, nearly any figure fits, as what is seen is late."""
 LEAST_SHARE, MOST_SHARE = 0.5, 2.0
 """No figure leaves these bounds, of what it began with."""
 ERROR_M_S, ERROR_RAD_S = 0.1, 0.15
