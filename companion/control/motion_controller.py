@@ -69,12 +69,12 @@ exact."""
 DRAGGED_STRAIGHTER_M = 0.1
 """The same on ground that drags it."""
 STANDS_M_S = 0.05
-TURNS_BACK_M_S = 0.1
-"""A rover that rolls faster is told to stand before it is told to go the other way. ArduRover's integral is full from
-braking and is emptied only where it has stopped (``ATC_STOP_SPEED``): else the rover rolls on for seconds, told to
-stand, at 0.2 m/s (2.2 s to a third)."""
-STANDS_SOON_S = 0.03
-"""A rover that brakes so hard that it stands after so long need not wait: the integral has had no time to fill."""
+STANDS_FIRST_M_S = 0.1
+"""A rover that rolls faster is told to stand before it is told to go slower than this, or the other way. ArduRover's
+integral is full from braking and is emptied only where the rover is told to stand and has stopped (``ATC_STOP_SPEED``):
+else it rolls on, or back, for seconds, told to stand, at 0.2 m/s (2.2 s to a third)."""
+BRAKES_AT_ONCE_M_S2 = 3.0
+"""A rover that brakes so hard need not stand first: the integral has no time to fill."""
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
 """Turn rates for which the fastest speed is looked for that may be told, as shares of the fastest."""
 NONE_ADMITTED = np.zeros((len(TURN_SHARES), 2))
@@ -133,6 +133,8 @@ class MotionController:
         """The last one."""
         self.backwards = False
         """Whether the rover rolled tail first when it was last led."""
+        self._stands_first = False
+        """Whether it was told to stand because of that."""
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
         """The path itself."""
@@ -203,6 +205,7 @@ class MotionController:
             return stop_for(Purpose.BLOCKED)
         found = self._planner.plan(problem, passed_s)
         told = self._safe(found.motion[0], view, worst)
+        self._stands_first = self._is_to_stand(told.speed_m_s, view)
         assert self._window is not None
         ahead = self._position.faster_than(told.speed_m_s, path, view)
         self.choice = MotionChoice(now_s, problem, found, told, self._window.corner, ahead)
@@ -240,15 +243,22 @@ class MotionController:
     def _safe(self, wanted: NDArray[np.float64], view: LocalView, worst: Problems) -> ToldVelocity:
         """This command, or a slower one, or the best way to brake."""
         now_s, speed_m_s, turn_rad_s = self._time_s, float(wanted[0]), float(wanted[1])
-        rolls_m_s = max(TURNS_BACK_M_S, STANDS_SOON_S * view.following.deceleration_m_s2)
-        if speed_m_s * view.forward_m_s < 0.0 and abs(view.forward_m_s) > rolls_m_s:
-            speed_m_s = 0.0
         for share in SHARES:
             # On the same arc; a rover that hardly moves keeps its turn rate.
-            told = ToldVelocity(now_s, share * speed_m_s, (share if abs(speed_m_s) > 0.1 else 1.0) * turn_rad_s)
+            slower_m_s, turns_rad_s = share * speed_m_s, (share if abs(speed_m_s) > 0.1 else 1.0) * turn_rad_s
+            told = ToldVelocity(now_s, 0.0 if self._is_to_stand(slower_m_s, view) else slower_m_s, turns_rad_s)
             if _may_be_left_alone(told, view, worst):
                 return told
         return self._braking(view, worst)
+
+    def _is_to_stand(self, speed_m_s: float, view: LocalView) -> bool:
+        """Whether it must have stood before it is told this: see ``STANDS_FIRST_M_S``."""
+        onward_m_s, rolls_m_s = math.copysign(speed_m_s, speed_m_s * view.forward_m_s), abs(view.forward_m_s)
+        # Without a guard such low speeds are how it gets through gaps: to stand each time took it 4 % longer.
+        slowest_m_s = STANDS_FIRST_M_S if _alone_s(view) == 0.0 else 0.0
+        if onward_m_s >= slowest_m_s or view.following.deceleration_m_s2 > BRAKES_AT_ONCE_M_S2:
+            return False
+        return rolls_m_s > (STANDS_M_S if self._stands_first else STANDS_FIRST_M_S)
 
     def _braking(self, view: LocalView, worst: Problems) -> ToldVelocity:
         """The way to brake that keeps most room; straight on where there is enough, or where dragged and in doubt."""
