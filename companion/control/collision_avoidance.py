@@ -43,6 +43,7 @@ from companion.control.motion_prediction import (
 from companion.control.point_controller import turn_to
 from companion.control.reference_path import ReferencePath
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
+from companion.control.turning_room import may_turn_to
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
 from companion.mapping.map_queries import ArcQueries, Until, look_along
 from companion.perception.moving_obstacles import Moving
@@ -239,6 +240,7 @@ class CollisionAvoidance:
         self._stops = False
         self._turned_rad_s = 0.0
         self._since_s: float | None = None
+        self._avoided_s = -math.inf
         self._turned_off_for: dict[str, tuple[Moving, float]] = {}
         """By name: what the rover turned off for, as it was known last, and when."""
 
@@ -272,7 +274,11 @@ class CollisionAvoidance:
         foresees: Foresees | None = None,
         turned_stops: TurnedStops | None = None,
     ) -> Option:
-        """What to do, as ``avoided`` says."""
+        """What to do, as ``avoided`` says. Where nothing has moved for ``REMEMBERS_S`` it begins anew."""
+        if view.pose.time_s - self._avoided_s > REMEMBERS_S:
+            self._aside_rad, self._stops, self._since_s = None, False, None
+        if moving:
+            self._avoided_s = view.pose.time_s
         option = avoided(
             command, line, view, moving, aside_rad=self._aside_rad, stops=self._stops, backwards=backwards,
             foresees=foresees, turned_stops=turned_stops, turned_rad_s=self._turned_rad_s,
@@ -341,6 +347,8 @@ def _on_the_way(outlook: Outlook, command: ControlCommand, line: ReferencePath |
             places = steered_along(way, course_rad, along_m, view.rover.turning_radius_m)
             nearer = _nearer(command, view.pose, along_m)
             yield Option(command, places, yields=False) if nearer is None else Option(nearer, places)
+    elif isinstance(command.setpoint, GuidedVelocity) and command.setpoint.forward_m_s < 0.0:
+        yield Option(command, _backed_off(outlook, -command.setpoint.forward_m_s, math.inf), yields=False)
     else:
         yield Option(command, halted, yields=False)
     yield Option(stop_for(Purpose.BRAKE), halted)
@@ -422,8 +430,10 @@ def _may_stand(view: LocalView, there: NedPoint) -> bool:
 
 
 def _aside(outlook: Outlook, bearing_rad: float) -> list[Option]:
-    """Turn to a bearing and drive a little, if the ground there is free."""
+    """Turn to a bearing and drive a little, if the ground there is free, and round the rover."""
     view, pose, guidance = outlook.view, outlook.view.pose, outlook.view.settings.guidance
+    if not may_turn_to(bearing_rad, view):
+        return []
     error_rad = abs(wrap_pi_rad(bearing_rad - pose.heading_rad))
     turns_s = error_rad / TURN_RAD_S + view.speed_m_s / guidance.deceleration_m_s2
     going_m_s = min(view.rover.cruise_speed_m_s, ASIDE_M_S)
@@ -448,10 +458,18 @@ def _back_off(outlook: Outlook) -> list[Option]:
     back_m_s = backing_speed_m_s(view)
     if back_m_s < BACK_LEAST_M_S or view.speed_m_s > guidance.roll_out_m_s + guidance.back_out_speed_m_s:
         return []
-    stands_s = guidance.brake_delay_s + view.speed_m_s / guidance.deceleration_m_s2
-    back_m = np.minimum(np.maximum(outlook.times_s - stands_s, 0.0) * back_m_s, OFF_M)
     command = ControlCommand(Purpose.LOOK, GuidedVelocity(-back_m_s, 0.0), back_m_s)
-    return [Option(command, places_ahead(view.pose, outlook.rolls_m - back_m))]
+    return [Option(command, _backed_off(outlook, back_m_s, OFF_M))]
+
+
+def _backed_off(outlook: Outlook, back_m_s: float, most_m: float) -> Points:
+    """Where the rover is while it goes straight back, once it stands, and no farther than ``most_m``."""
+    view, guidance = outlook.view, outlook.guidance
+    if view.rolls_back:
+        return places_ahead(view.pose, -np.minimum(outlook.times_s * back_m_s, most_m))
+    stands_s = guidance.brake_delay_s + view.speed_m_s / guidance.deceleration_m_s2
+    back_m = np.minimum(np.maximum(outlook.times_s - stands_s, 0.0) * back_m_s, most_m)
+    return places_ahead(view.pose, outlook.rolls_m - back_m)
 
 
 def _on_arcs(outlook: Outlook) -> Iterator[Option]:

@@ -14,10 +14,11 @@ from companion.core.rover_limits import RoverLimits
 from companion.settings import MotionSettings
 from companion.vehicle.motion_limits import ACCELERATION, CRUISE, DECELERATION, FASTEST, TURN_ACCELERATION, TURN_RATE
 
-MOST_M_S2, MOST_RAD_S2 = 10.0, 20.0
+MOST_M_S2 = 10.0
 """Where the autopilot has no limit, or a larger one, the motors have."""
-BELIEVED_M_S2 = 2.0
-"""No rover is taken to brake or gather speed better than this because its autopilot would let it."""
+BELIEVED_M_S2, BELIEVED_RAD_S2 = 2.0, 4.0
+"""No rover is taken to brake, gather speed or change its turn rate better than this because its autopilot would let
+it."""
 GUARDED_S = 1.0
 """A velocity that lasts no longer is ended by a guard."""
 LONG_OFF = 0.1
@@ -53,19 +54,19 @@ AS_SHIPPED = Following()
 def following_of(settings: MotionSettings, parameters: Mapping[str, float]) -> Following:
     """As set; what is not set is read from the autopilot's parameters, as shipped where they are not known.
 
-    A limit of the autopilot says what the rover does at most. That is counted on up to ``BELIEVED_M_S2``; where there
-    is no limit, the rover is taken to brake as one with the limits as shipped.
+    A limit of the autopilot says what the rover does at most. That is counted on up to ``BELIEVED_M_S2`` and
+    ``BELIEVED_RAD_S2``; where there is no limit, the rover is taken to do as one with the limits as shipped.
     """
     usual = AS_SHIPPED
     most_m_s2 = settings.acceleration_m_s2 or _limit(parameters, ACCELERATION, usual.acceleration_m_s2, MOST_M_S2)
-    gains = settings.acceleration_m_s2 or _believed(parameters, ACCELERATION, usual.acceleration_m_s2)
+    gains = settings.acceleration_m_s2 or _believed(parameters, ACCELERATION, usual.acceleration_m_s2, BELIEVED_M_S2)
     brakes = settings.deceleration_m_s2
     if brakes is None:
-        brakes = _believed(parameters, DECELERATION, gains) if parameters.get(DECELERATION) else gains
+        brakes = _believed(parameters, DECELERATION, gains, BELIEVED_M_S2) if parameters.get(DECELERATION) else gains
     turns = settings.turn_acceleration_rad_s2
     if turns is None:
         usual_deg_s2 = math.degrees(usual.turn_acceleration_rad_s2)
-        turns = math.radians(_limit(parameters, TURN_ACCELERATION, usual_deg_s2, math.degrees(MOST_RAD_S2)))
+        turns = math.radians(_believed(parameters, TURN_ACCELERATION, usual_deg_s2, math.degrees(BELIEVED_RAD_S2)))
     off = settings.off_model
     return Following(settings.dead_s, gains, brakes, turns, settings.turn_gain, off, most_m_s2 * (1.0 + off))
 
@@ -84,9 +85,9 @@ def within_limits(rover: RoverLimits, parameters: Mapping[str, float]) -> RoverL
     )
 
 
-def _believed(parameters: Mapping[str, float], name: str, usual: float) -> float:
+def _believed(parameters: Mapping[str, float], name: str, usual: float, most: float) -> float:
     value = parameters.get(name, usual)
-    return min(value, BELIEVED_M_S2) if value > 0.0 else usual
+    return min(value, most) if value > 0.0 else usual
 
 
 def _limit(parameters: Mapping[str, float], name: str, usual: float, most: float) -> float:

@@ -1,8 +1,9 @@
 """Left alone: where a rover goes that is told one thing and then nothing more, and what its outline meets there.
 
-This is the last look's own reckoning. It shares no code with controllers and planning: it asks each cell of the
-evidence map under the outline, not a field of distances or a line, and follows the rover in steps of its own. So an
-error there is not repeated here. It is a little milder, so that it speaks only where something is wrong.
+This is the last look's own reckoning of ways and of what stands there: it asks each cell of the evidence map under the
+outline, not a field of distances or a line, and follows the rover in steps of its own. So an error in that is not
+repeated here. What is known of the rover (``Following``) and what it was told it has from where the controllers have
+it. It is a little milder, so that it speaks only where something is wrong.
 
 Nouns: left alone.
 """
@@ -45,6 +46,8 @@ CORNER = 0.75
 """A rover at the border of its field may cut the corner of a closed one within this share of a field's side."""
 PIECE_M = 0.05
 """A way of the middle is looked at so often."""
+TURN_RAD = 0.1
+"""So often the outline is looked at while the rover turns on the spot."""
 
 Places = NDArray[np.float64]
 """Shape (n, 4): metres north and east of the map's corner, heading, forward speed."""
@@ -110,6 +113,16 @@ def once_turned_back(places: Places, setpoint: GuidedVelocity, view: LocalView) 
         return places
     turned = np.flatnonzero(places[:, 3] * setpoint.forward_m_s > 0.0)
     return places[min(turned[0] if len(turned) else len(places), len(places) - 2) :]
+
+
+def turned_on_the_spot(bearing_rad: float, view: LocalView) -> Places:
+    """The rover turned the shorter way to a bearing, where it is."""
+    heading_rad = view.pose.heading_rad
+    turn_rad = math.remainder(bearing_rad - heading_rad, 2.0 * math.pi)
+    headings_rad = heading_rad + np.linspace(0.0, turn_rad, 2 + math.ceil(abs(turn_rad) / TURN_RAD))
+    places = np.zeros((len(headings_rad), 4))
+    places[:, :2], places[:, 2] = _from_corner(view), headings_rad
+    return places
 
 
 def along(way: NDArray[np.float64], radius_m: float, evidence: EvidenceMap, away: float = AWAY) -> tuple[int, int]:

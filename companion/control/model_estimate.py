@@ -84,12 +84,13 @@ class ModelEstimate:
     def following(self, off_model_known: float) -> Following:
         """The figures, and how far the rover may be off them: the less, the more is known, down to that share.
 
-        A rover that is told to gain speed gently is seen to gain less than it can: as much as was assumed at first
-        remains possible.
+        A rover that is told to gain speed gently is seen to gain less than it can: as much as the autopilot lets it
+        (``gains_most_m_s2`` at first, but for the doubt in it) remains possible.
         """
         doubted = self.began.off_model
         off = doubted - self.known * max(doubted - off_model_known, 0.0)
-        possible_m_s2 = self.known * self.began.acceleration_m_s2 + (1.0 - self.known) * self.began.gains_most_m_s2
+        most_m_s2 = self.began.gains_most_m_s2
+        possible_m_s2 = self.known * most_m_s2 / (1.0 + doubted) + (1.0 - self.known) * most_m_s2
         most_m_s2 = max(self.figures.acceleration_m_s2 * (1.0 + off), possible_m_s2)
         return self.figures._replace(off_model=off, gains_most_m_s2=most_m_s2)
 

@@ -19,19 +19,30 @@ from numpy.typing import NDArray
 
 from companion.control.braking import blind_distance_m, braking_distance_m, farthest_m, overshoot_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
-from companion.control.left_alone import PIECE_M, Met, Places, along, first_met, once_turned_back, ways_left_alone
+from companion.control.left_alone import (
+    PIECE_M,
+    Met,
+    Places,
+    along,
+    first_met,
+    once_turned_back,
+    turned_on_the_spot,
+    ways_left_alone,
+)
 from companion.control.local_view import LocalView
-from companion.core.frames import NedPoint
+from companion.core.frames import NedPoint, wrap_pi_rad
 from companion.core.severity import Severity, TextSink
 from companion.mission.bounds import Bounds
 from companion.safety.reasons import Reason, SetpointFault
-from companion.vehicle.commands import GuidedPosition, GuidedVelocity, Setpoint
+from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
 
 SLACK_M = 0.1
 """The controllers look in steps, and let a line end a few centimetres before an obstacle."""
 NEARER_M = 0.05
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
 STANDS_M_S = 0.05
+PIVOTS_RAD = math.radians(20.0)
+"""A standing rover turns on the spot for a position that lies farther aside."""
 ARC_PIECES = 8
 """Straight pieces that an arc is made of where borders are concerned."""
 
@@ -128,6 +139,25 @@ def _fault_on(ways: list[Places] | None, view: LocalView) -> Fault | None:
     return None
 
 
+def turning_meets_nothing(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault | None:
+    """A rover that turns on the spot, to a heading or before a position aside, meets nothing with its outline.
+
+    Where points lead, the map keeps the circle round the outline, and the rover may turn anywhere.
+    """
+    if view.settings.guidance.controller == "points":
+        return None
+    if isinstance(setpoint, GuidedHeading):
+        bearing_rad = setpoint.heading_rad
+    elif isinstance(setpoint, GuidedPosition) and view.speed_m_s <= STANDS_M_S:
+        bearing_rad = view.pose.point.bearing_rad(setpoint.point)
+        if abs(wrap_pi_rad(bearing_rad - view.pose.heading_rad)) <= PIVOTS_RAD:
+            return None
+    else:
+        return None
+    met = first_met(turned_on_the_spot(bearing_rad, view), view)
+    return Reason(SetpointFault.TURNS_INTO_OBSTACLE) if met is Met.OBSTACLE else None
+
+
 def inside_borders(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault | None:
     """The straight way to a guided position, and the way on which a guided velocity ends, cross no border."""
     if len(bounds) == 0:
@@ -191,7 +221,7 @@ def _stopping_way(velocity: GuidedVelocity, view: LocalView) -> list[NedPoint]:
     return way
 
 
-RULES: tuple[Rule, ...] = (position_in_sight, velocity_stops_in_time, inside_borders)
+RULES: tuple[Rule, ...] = (position_in_sight, velocity_stops_in_time, turning_meets_nothing, inside_borders)
 
 
 def fault_of(setpoint: Setpoint, view: LocalView, bounds: Bounds, rules: tuple[Rule, ...] = RULES) -> Fault | None:

@@ -34,8 +34,8 @@ LINGERS_PER_M = 4.0
 PATIENT = 5.0
 """Motions planned without a guard have so many times longer: into a gap of 0.2 m more than its width a rover creeps a
 few centimetres a second."""
-TURNS_RAD_S = 0.3
-"""A rover that turns slower goes back straight."""
+TURNS_RAD_S, ROLLS_M_S = 0.3, 0.1
+"""A rover that turns slower goes back straight; one that rolls ahead slower stands at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,12 +111,12 @@ class StuckRecovery:
         """Straight back over ground that is known to be free, and no farther; None when not under way.
 
         Where much of that ground was never seen it creeps. A rover that still turns stands first: it would not go
-        straight.
+        straight. So does one that still rolls ahead: ArduRover's integral is full from braking.
         """
         if not self.is_backing(view.pose.time_s):
             return None
         self._progress = None
-        if abs(view.yaw_rate_rad_s) > TURNS_RAD_S:
+        if abs(view.yaw_rate_rad_s) > TURNS_RAD_S or view.forward_m_s > ROLLS_M_S:
             return STANDSTILL
         speed_m_s = backing_speed_m_s(view)
         if speed_m_s < BACK_LEAST_M_S:

@@ -558,14 +558,17 @@ class MissionExecutor:
 
     def _tell_of_gaps(self) -> None:
         """Which gaps count as closed, and what would open more, where something would."""
-        rover, evidence = self._mission.rover, self.evidence
-        size = field_size(rover, evidence.settings, narrow_sight=self._scan.is_narrow)
+        rover, evidence, grid = self._mission.rover, self.evidence, self._mission.grid
+        settings = evidence.settings.model_copy(update={"evidence_m": evidence.evidence_m})
+        size = field_size(rover, settings, narrow_sight=self._scan.is_narrow)
         side_m = evidence.base.resolution_m
-        gap_m = sure_gap_m(rover, evidence.settings, side_m)
+        gap_m = sure_gap_m(rover, settings, side_m)
         if size.may_be_finer(side_m):
-            fine_m = finer_gap_m(rover, evidence.settings, size.fine_m)
+            fine_m = finer_gap_m(rover, settings, size.fine_m)
+            # Evidence for planned motions is finest where fields follow from the rover.
+            how = "" if settings.keeps == "circle" or grid.by_footprint else " (leave out grid.resolution_m)"
             text = (
-                f"Map fields of {side_m:.3g} m may close gaps below {gap_m:.1f} m; smaller ones open more, "
+                f"Map fields of {side_m:.3g} m may close gaps below {gap_m:.1f} m; smaller ones{how} open more, "
                 f"of {size.fine_m:.2g} m down to {fine_m:.1f} m"
             )
         else:

@@ -57,6 +57,7 @@ class SetpointFault(Enum):
     ON_UNSEEN_GROUND = "target on ground not seen"
     NOT_A_NUMBER = "velocity is not a number"
     INTO_OBSTACLE = "velocity leads into something"
+    TURNS_INTO_OBSTACLE = "turning leads into something"
     ONTO_UNSEEN = "velocity leads onto ground not seen"
     OVER_BORDER = "setpoint leads over the border of {}"
 

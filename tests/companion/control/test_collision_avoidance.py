@@ -164,6 +164,28 @@ def test_with_thin_beams_it_is_told_no_place_aside_that_the_last_look_refuses(sp
     assert fault_of(option.command.setpoint, moment, Bounds()) is None
 
 
+def test_a_long_rover_does_not_turn_aside_into_a_post() -> None:
+    body, comes = Footprint.rectangle(2.0, 0.5), Moving("m", 100.0, NedPoint(25.0, 20.0), -1.2, 0.0, 0.5)
+    told = []
+    for posts in ((), ((20.6, 19.5), (19.4, 20.5), (20.6, 20.5), (19.4, 19.5))):
+        ground = open_ground()
+        for north_m, east_m in posts:
+            y, x = (math.floor(v / ground.evidence_m) for v in (north_m, east_m))
+            ground.log_odds[y, x] = 3.0
+        told.append(avoided(DRIVE, PATH, replace(view(0.0, ground), body=body), (comes,)).command.setpoint)
+    assert isinstance(told[0], GuidedHeading) and not isinstance(told[1], GuidedHeading | GuidedPosition)
+
+
+def test_backing_out_is_foreseen_as_going_back() -> None:
+    """Who crosses behind the rover is not backed into."""
+    back = ControlCommand(Purpose.LOOK, GuidedVelocity(-0.4, 0.0), 0.4)
+    for north_m, goes in ((19.1, False), (23.0, True)):
+        behind = Moving("m", 100.0, NedPoint(north_m, 18.8), 0.0, 0.6, 0.3)
+        for rolls_back in (False, True):
+            at = replace(view(0.3 if rolls_back else 0.0), rolls_back=rolls_back)
+            assert (avoided(back, PATH, at, (behind,)).command == back) is goes
+
+
 def test_it_backs_off_between_walls() -> None:
     towards = Moving("m", 100.0, NedPoint(22.0, 20.0), -0.35, 0.0, 0.5)
     standing = ControlCommand(Purpose.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)

@@ -31,8 +31,9 @@ def test_an_autopilot_without_limits_makes_no_rover_brake_better() -> None:
     """It may gather speed as fast as motors can, but it is counted on to brake as one with the limits as shipped."""
     follows = following_of(MotionSettings(), {"ATC_ACCEL_MAX": 0.0, "ATC_DECEL_MAX": 0.0, "ATC_STR_ACC_MAX": 0.0})
     assert follows[1:3] == (1.0, 1.0) and follows.gains_most_m_s2 == pytest.approx(13.0)
-    assert follows.turn_acceleration_rad_s2 == pytest.approx(20.0)
-    large = following_of(MotionSettings(), {"ATC_ACCEL_MAX": 20.0, "ATC_DECEL_MAX": 5.0})
+    assert follows.turn_acceleration_rad_s2 == AS_SHIPPED.turn_acceleration_rad_s2
+    large = following_of(MotionSettings(), {"ATC_ACCEL_MAX": 20.0, "ATC_DECEL_MAX": 5.0, "ATC_STR_ACC_MAX": 900.0})
+    assert large.turn_acceleration_rad_s2 == pytest.approx(4.0)
     assert large[1:3] == (2.0, 2.0) and large.gains_most_m_s2 == pytest.approx(13.0)
 
 

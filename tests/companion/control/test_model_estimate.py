@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.control.following import AS_SHIPPED, Following
+from companion.control.following import AS_SHIPPED, Following, following_of
 from companion.control.local_view import LocalView
 from companion.control.model_estimate import KNOWN_S, ModelEstimate, ModelEstimator, described
 from companion.control.told import Told, after
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
-from companion.settings import Settings
+from companion.settings import MotionSettings, Settings
 from companion.vehicle.commands import GuidedVelocity
 from tests.companion.control.test_motion_ground import ground
 
@@ -74,7 +74,14 @@ def test_a_rover_seen_to_gain_little_speed_may_still_gain_as_much_as_its_limit()
         for gains, seconds in ((1.0, 1.0), (0.6, 30.0), (1.5, 30.0))
     )
     assert begun == AS_SHIPPED.gains_most_m_s2
-    assert gentle == AS_SHIPPED.acceleration_m_s2 and quick == pytest.approx(1.65, rel=0.15)
+    assert gentle == pytest.approx(AS_SHIPPED.acceleration_m_s2) and quick == pytest.approx(1.65, rel=0.15)
+
+
+def test_a_rover_that_is_known_may_gain_as_much_speed_as_its_autopilot_lets_it() -> None:
+    """It is counted on to gain no more than 1 m/s² where there is no limit: what it can is another figure."""
+    began = following_of(MotionSettings(), {"ATC_ACCEL_MAX": 0.0})
+    estimate = ModelEstimate(began, began._replace(acceleration_m_s2=2.0), KNOWN_S, KNOWN_S, KNOWN_S)
+    assert estimate.known == 1.0 and estimate.following(0.1).gains_most_m_s2 == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize("noise", [0.02, 0.2])

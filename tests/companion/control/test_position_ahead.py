@@ -61,10 +61,12 @@ def test_none_that_is_near_or_before_which_the_rover_could_not_get_fast() -> Non
 
 
 def test_a_place_aside_only_where_the_way_on_which_the_rover_rolls_is_clear_too() -> None:
-    """Told a place 45 degrees aside at 1.5 m/s it first goes on for 2.8 m."""
+    """Told a place 45 degrees aside at 1.5 m/s it first goes on for 3.5 m."""
     walled = ground()
     wall(walled, 6.0, 6.5, 8.5)
-    for evidence, told in ((ground(), True), (walled, False)):
+    far = ground()
+    wall(far, 6.6, 6.5, 8.5)
+    for evidence, told in ((ground(), True), (walled, False), (far, False)):
         seen = replace(view(evidence), pose=Pose(3.0, 7.5, math.radians(0.0), 1.0))
         aside = ReferencePath(np.array([(3.0 + d, 7.5 + d) for d in np.arange(0.0, 4.0, STEP_M / math.sqrt(2.0))]))
         assert (PositionAhead().faster_than(0.2, aside, seen) is not None) == told

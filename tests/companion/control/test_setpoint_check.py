@@ -19,6 +19,7 @@ from companion.control.local_view import LocalView
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
 from companion.control.setpoint_check import SetpointCheck, fault_of, inside_borders
 from companion.control.told import Told, ToldVelocity
+from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -73,6 +74,31 @@ def test_a_position_is_not_behind_the_wall_into_which_the_rover_would_overshoot(
     held = replace(view(evidence, pose), held_m_s=1.0)
     found = fault_of(GuidedPosition(NedPoint(6.7, MIDDLE)), held, Bounds(()))
     assert found is not None and found.kind is SetpointFault.BEHIND_OBSTACLE
+
+
+@pytest.mark.parametrize(
+    ("setpoint", "kind"),
+    [
+        (GuidedHeading(0.5 * math.pi), SetpointFault.TURNS_INTO_OBSTACLE),
+        (GuidedHeading(0.1), None),
+        (GuidedPosition(NedPoint(MIDDLE + 1.5, MIDDLE - 2.0)), SetpointFault.TURNS_INTO_OBSTACLE),
+        (GuidedPosition(NedPoint(MIDDLE + 2.0, MIDDLE)), None),
+    ],
+)
+@pytest.mark.parametrize("planned", [True, False])
+def test_a_rover_does_not_turn_its_corners_into_something(
+    setpoint: Setpoint, kind: SetpointFault | None, planned: bool
+) -> None:
+    """On its own outline where motions are planned; where points lead the map keeps the circle round it."""
+    evidence = open_ground()
+    for north_m, east_m in ((0.65, 0.6), (-0.75, 0.45)):
+        y, x = (math.floor((MIDDLE + v) / evidence.evidence_m) for v in (north_m, east_m))
+        evidence.log_odds[y, x] = 3.0
+    at = replace(view(evidence, Pose(MIDDLE, MIDDLE, 0.0, 0.0)), body=Footprint.rectangle(2.0, 0.5))
+    if planned:
+        at = replace(at, settings=Settings.model_validate({"guidance": {"controller": "motion-ga"}}))
+    found = fault_of(setpoint, at, Bounds(()))
+    assert (None if found is None else found.kind) is (kind if planned else None)
 
 
 def test_the_way_to_a_position_is_as_wide_as_the_rover_not_as_what_the_map_keeps() -> None:

@@ -124,6 +124,14 @@ def test_one_that_still_turns_stands_first_as_it_would_not_go_straight() -> None
     assert command is not None and command.speed_m_s > 0.0
 
 
+def test_one_that_still_rolls_ahead_stands_first() -> None:
+    recovery, evidence = watching(), seen_map()
+    recovery.back_out(view(1.0, evidence), AHEAD)
+    assert recovery.backing(replace(view(1.0, evidence), speed_m_s=0.3)) == STANDSTILL
+    back = recovery.backing(replace(view(1.5, evidence), speed_m_s=0.3, rolls_back=True))
+    assert back is not None and back.speed_m_s > 0.0
+
+
 def test_without_room_behind_it_stands_and_that_is_all() -> None:
     recovery, evidence = watching(), seen_map()
     evidence.log_odds[:78] = 2.0

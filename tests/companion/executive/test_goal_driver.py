@@ -1,8 +1,10 @@
 """The driver beside a navigator that takes its time, and a rover that does not move."""
 
+from dataclasses import replace
 from threading import Event
 
 import numpy as np
+import pytest
 
 from companion.control.controller import ControlCommand, Purpose
 from companion.control.local_view import LocalView
@@ -22,6 +24,7 @@ from companion.navigation.step_runner import InlineRunner, StepCall, StepRunner,
 from companion.perception.moving_obstacles import Moving
 from companion.planning.registry import make_planner
 from companion.settings import Settings
+from companion.settings.settings_file import parse_settings
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
 SETTINGS = Settings()
@@ -179,6 +182,27 @@ def test_a_rover_faster_than_it_may_be_is_braked() -> None:
     surging, _ = one.update(0.2, 2.4)
     assert (surging.purpose, surging.setpoint) == (Purpose.BRAKE, GuidedVelocity(0.0, 0.0))
     assert one.update(0.3, 2.2)[0].purpose is Purpose.DRIVE
+
+
+def test_what_comes_into_view_later_is_made_way_for_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The patience for the first one does not last until then."""
+    one, paused = Drive(InlineRunner()), []
+    settings = parse_settings({"traffic": {"patience_s": 5.0}}, "test")
+    one.head_for(target(32.5, 20.5))
+    one.update(0.0, 1.5)
+    pause = one.driver.pause
+
+    def counted() -> None:
+        paused.append(1)
+        pause()
+
+    monkeypatch.setattr(one.driver, "pause", counted)
+    for begins_s in (0.1, 6.0):
+        comes = Moving("seen", begins_s, NedPoint(23.4, 22.6), 0.0, -0.9, 0.5)
+        told = one.driver.guide(replace(one.at(begins_s, 1.5), settings=settings), (comes,))
+        assert (told.purpose, one.driver.makes_way) == (Purpose.BRAKE, True)
+        one.driver.guide(one.at(begins_s + 0.1, 1.5))
+    assert len(paused) == 2
 
 
 class TurnsOff(PointController):

@@ -60,6 +60,7 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (SetpointFault.ON_UNSEEN_GROUND, (), "target on ground not seen"),
     (SetpointFault.NOT_A_NUMBER, (), "velocity is not a number"),
     (SetpointFault.INTO_OBSTACLE, (), "velocity leads into something"),
+    (SetpointFault.TURNS_INTO_OBSTACLE, (), "turning leads into something"),
     (SetpointFault.ONTO_UNSEEN, (), "velocity leads onto ground not seen"),
     (SetpointFault.OVER_BORDER, ("the yard",), "setpoint leads over the border of the yard"),
     (LatchReason.OTHER_MODE, ("GUIDED",), "mode is not GUIDED"),
