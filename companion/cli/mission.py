@@ -25,7 +25,7 @@ from companion.mission.doubtful_places import doubtful_places
 from companion.mission.field_size import FieldSize, field_size
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
-from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place
+from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place, RoverSpec
 from companion.mission.outline_hint import outline_hint
 from companion.mission.resolve import ResolvedMission, resolve
 from companion.mission.sensor_tables import BEAMS
@@ -275,7 +275,7 @@ def _vehicle(mission: Mission, settings: Settings) -> list[str]:
     turns = (
         f"in arcs of {rover.turning_radius_m:g} m radius or wider" if rover.turning_radius_m > 0.0 else "on the spot"
     )
-    lines = [f"rover: radius {rover.radius_m:g} m, cruises at {rover.cruise_speed_m_s:g} m/s, turns {turns}"]
+    lines = [f"rover: {outline_text(rover)}, cruises at {rover.cruise_speed_m_s:g} m/s, turns {turns}"]
     if hint := outline_hint(rover, settings.guidance.controller):
         lines.append(f"note: {hint}")
     if mission.planned_home is not None:
@@ -304,6 +304,19 @@ def place_text(place: Place) -> str:
         return "home"
     north_south = f"{abs(place.north_m):g} m {'south' if place.north_m < 0.0 else 'north'}"
     return f"{north_south}, {abs(place.east_m):g} m {'west' if place.east_m < 0.0 else 'east'} of home"
+
+
+def outline_text(rover: RoverSpec) -> str:
+    """The outline in the words of the file's keys, so that a slip in them is seen; the circle round it."""
+    if rover.rectangle is None:
+        return f"radius {rover.radius_m:g} m"
+    outline = rover.rectangle
+    forward_m = round(0.5 * (outline.front_m - outline.rear_m), 6)
+    middle = f"{abs(forward_m):g} m {'behind' if forward_m < 0.0 else 'ahead of'} the centre of rotation"
+    return (
+        f"{outline.front_m + outline.rear_m:g} m long, {2.0 * outline.half_width_m:g} m wide, its middle "
+        f"{middle if forward_m else 'at the centre of rotation'}, in a circle of radius {rover.radius_m:.3g} m"
+    )
 
 
 def mover_text(mover: MoverSpec) -> str:
