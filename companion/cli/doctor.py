@@ -21,11 +21,12 @@ from companion.cli.lidars import LidarOption, lidars_given
 from companion.cli.state import StateFiles
 from companion.control.model_estimate import ModelEstimate, described
 from companion.core.clock import Clock, WallClock
-from companion.core.frames import LocalFrame, NedPoint
 from companion.core.scan import RangeScan
 from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Finding, Level
 from companion.diagnosis.payload import Command, parameters_of, payload
+from companion.executive.controller_choice import settings_for
+from companion.executive.open_gaps import map_at_start, open_gap_m
 from companion.executive.warm_up import kernels_warm
 from companion.lidar.examination import LidarHeard, lidar_findings
 from companion.lidar.reader import LidarReader, Lidars, lidars_on
@@ -33,17 +34,15 @@ from companion.lidar.serial_port import listened, open_ports
 from companion.lidar.spec import LidarError, LidarSpec
 from companion.lidar.swapped_port import INSTEAD_OF, findings_of_port
 from companion.lidar.trouble import LidarTrouble, trouble
-from companion.mapping.map_files import MapError
 from companion.mavlink import port_users
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import ByteLink, LinkError, device_of, open_link
 from companion.mission.doubtful_places import doubtful_places
-from companion.mission.field_size import field_size, finer_gap_m
+from companion.mission.field_size import field_size
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
-from companion.mission.resolve import resolve
 from companion.settings import Settings, SettingsError
 from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
 from companion.vehicle.survey import RangeSource, Survey
@@ -167,18 +166,18 @@ def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Findi
     home = seen.vehicle.home
     if home is None:
         return []
-    rover, mapping = mission.rover, settings.mapping
-    sees = seen.vehicle.scan_ahead
-    size = field_size(rover, mapping, narrow_sight=sees is not None and sees.scan.is_narrow)
+    rover, sees = mission.rover, seen.vehicle.scan_ahead
+    narrow = sees is not None and sees.scan.is_narrow
+    settings = settings_for(settings, narrow_sight=narrow, turning_radius_m=rover.turning_radius_m)
     try:
-        side_m = resolve(mission, LocalFrame(home.point), NedPoint(0.0, 0.0), size=size).ground.resolution_m
-    except (MissionError, MapError) as error:
+        evidence = map_at_start(mission, settings, home.point, narrow_sight=narrow)
+    except MissionError as error:
         return [Finding("mission", Level.STOP, f"{error}.", "change the mission as it says")]
     doubtful = doubtful_places(mission, home.point)
     found = [Finding("far-target", Level.WARN, line, "look at the mission's places") for line in doubtful]
     if mission.grid.by_footprint:
-        gap_m = finer_gap_m(rover, mapping, side_m)
-        finer = size.may_be_finer(side_m)
+        side_m, gap_m = evidence.base.resolution_m, open_gap_m(rover, evidence)
+        finer = field_size(rover, settings.mapping, narrow_sight=narrow).may_be_finer(side_m)
         remedy = "for narrower ones: resolution_m" if finer else "smaller fields would open no more"
         says = f"The mission's fields are {side_m:.3g} m wide: the rover drives through gaps of {gap_m:.1f} m or more."
         found.append(Finding("fields", Level.NOTE, says, f"{remedy}, docs/missions.md"))

@@ -80,5 +80,6 @@ def _upload(place: str, settings: LinkSettings, data: bytes) -> None:
         UploadEnd.NO_ROVER: "check link and port",
         UploadEnd.ARMED: "disarm it first",
     }.get(upload.end, BY_HAND)
-    typer.echo(f"{place}: {upload.end}; {remedy}", err=True)
+    lost = "; the script that was there may be gone: install it again before you restart the autopilot"
+    typer.echo(f"{place}: {upload.end}; {remedy}{lost if upload.removed else ''}", err=True)
     raise typer.Exit(EXIT_NOBODY if upload.end is UploadEnd.NO_ROVER else EXIT_NOT_THERE)

@@ -17,10 +17,12 @@ from companion.cli.source import warn_of_places, warning
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.executive.controller_choice import settings_for
+from companion.executive.open_gaps import map_at_start, open_gap_m
+from companion.mapping.evidence_map import EvidenceMap
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.do_commands import DoCommand
 from companion.mission.doubtful_places import doubtful_places
-from companion.mission.field_size import FieldSize, field_size, finer_gap_m
+from companion.mission.field_size import FieldSize, field_size
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place, RoverSpec
@@ -29,7 +31,6 @@ from companion.mission.resolve import ResolvedMission, resolve
 from companion.mission.sensor_tables import BEAMS
 from companion.mission.simulated_world import SimulatedWorld, check_start, doubtful_targets, world_of
 from companion.settings import Settings, SettingsError
-from companion.settings.settings_file import by_points
 
 app = typer.Typer(name="mission", add_completion=False)
 
@@ -65,7 +66,7 @@ def check(
     except (MissionError, MapError, SettingsError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    show(mission, settings, maps, Console(highlight=False), resolved)
+    show(mission, settings, maps, Console(highlight=False))
     warn_of_places(mission, lambda line: typer.echo(warning(line)))
     for line in _doubtful_in(world, mission, resolved):
         typer.echo(warning(line))
@@ -113,8 +114,8 @@ def _try_resolve(mission: Mission, settings: Settings) -> ResolvedMission | None
     a mission in degrees is resolved only where the file has one, and then only a grid that is too large is refused.
     Raises MissionError.
     """
-    degrees, size = any(isinstance(place, GeoPoint) for place in _all_places(mission)), _size_of(mission, settings)
-    if not degrees:
+    size = _size_of(mission, settings)
+    if _first_in_degrees(mission) is None:
         return resolve(mission, LocalFrame(GeoPoint(0.0, 0.0)), NedPoint(0.0, 0.0), size=size)
     if mission.planned_home is None:
         return None
@@ -135,20 +136,38 @@ def _has_beams(mission: Mission) -> bool:
     return mission.sitl is not None and mission.sitl.sensors == BEAMS
 
 
+def _first_in_degrees(mission: Mission) -> GeoPoint | None:
+    """The first place in degrees, if there is any."""
+    return next((place for place in _all_places(mission) if isinstance(place, GeoPoint)), None)
+
+
+def _map_at_start(mission: Mission, settings: Settings, *, narrow_sight: bool) -> EvidenceMap | None:
+    """The map as at the start of a run; None where it cannot be laid, or where it depends on a home that is not known.
+
+    Fields of a size that is given lie round any home alike: the first place in degrees may stand for it.
+    """
+    somewhere = _first_in_degrees(mission)
+    home = mission.planned_home or (GeoPoint(0.0, 0.0) if somewhere is None else somewhere)
+    if mission.grid.by_footprint and mission.planned_home is None and somewhere is not None:
+        return None
+    try:
+        return map_at_start(mission, settings, home, narrow_sight=narrow_sight)
+    except MissionError:
+        return None
+
+
 def _all_places(mission: Mission) -> list[Place]:
     areas = [*mission.keep_out, *mission.keep_in, *(weighted.area for weighted in mission.weighted)]
     return [*(target.place for target in mission.targets), *(place for area in areas for place in area.places)]
 
 
-def show(
-    mission: Mission, settings: Settings, maps: list[str], console: Console, resolved: ResolvedMission | None = None
-) -> None:
-    """Print the mission. ``resolved``: where it lies, if that is known."""
+def show(mission: Mission, settings: Settings, maps: list[str], console: Console) -> None:
+    """Print the mission."""
     console.print(f"[bold]{escape(mission.name)}[/bold]", soft_wrap=True)
     console.print(_targets(mission))
     for line in (
         *_commands(mission),
-        *_ground(mission, settings, resolved),
+        *_ground(mission, settings),
         *_vehicle(mission, settings),
         *maps,
         *(f"note: {note}" for note in mission.notes),
@@ -192,10 +211,9 @@ def command_text(command: DoCommand) -> str:
     return " ".join([*parts, "once" if not command.repeatable else ""]).strip()
 
 
-def _ground(mission: Mission, settings: Settings, resolved: ResolvedMission | None) -> list[str]:
+def _ground(mission: Mission, settings: Settings) -> list[str]:
     grid = mission.grid
-    by_rover = grid.by_footprint
-    size = _fields_by_rover(mission, settings, resolved) if by_rover else _fields(mission, settings)
+    size = _fields_by_rover(mission, settings) if grid.by_footprint else _fields(mission, settings)
     if grid.size is not None and grid.home is not None:
         lines = [f"grid: {grid.size[0]} x {grid.size[1]} {size}, home is the middle of {place_text(grid.home)}"]
     else:
@@ -209,30 +227,30 @@ def _ground(mission: Mission, settings: Settings, resolved: ResolvedMission | No
 
 def _fields(mission: Mission, settings: Settings) -> str:
     """How large fields are, and what narrow ground that leaves open."""
-    side_m = mission.grid.resolution_m
-    return f"fields of {side_m:g} m, for gaps of {_gap_m(mission.rover, settings, side_m):.1f} m or more"
+    evidence = _map_at_start(mission, settings, narrow_sight=_has_beams(mission))
+    gaps = "" if evidence is None else f", for gaps of {open_gap_m(mission.rover, evidence):.1f} m or more"
+    return f"fields of {mission.grid.resolution_m:g} m{gaps}"
 
 
-def _fields_by_rover(mission: Mission, settings: Settings, resolved: ResolvedMission | None) -> str:
+def _fields_by_rover(mission: Mission, settings: Settings) -> str:
     """The same where the file does not say how large they are."""
     rover, size = mission.rover, _size_of(mission, settings)
     why = "as single beams need" if _has_beams(mission) else "by the rover's size"
-    if resolved is None:
+    evidence = _map_at_start(mission, settings, narrow_sight=_has_beams(mission))
+    if evidence is None:
         return f"fields of {size.fine_m:g} m ({why}; larger on ground with more than {size.most})"
-    side_m = resolved.ground.resolution_m
-    gap_m = _gap_m(rover, settings, side_m)
+    side_m = evidence.base.resolution_m
     size_of = f"fields of {side_m:.3g} m ({why}"
     if size.may_be_finer(side_m):
         of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
         smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"
         size_of += f", and no more than {size.most}; for narrower gaps give {smaller}"
-    beams_m = field_size(rover, settings.mapping, narrow_sight=True).fine_m
-    beams = f"; with single beams alone of {beams_m:g} m, for {_gap_m(rover, by_points(settings), beams_m):.1f} m"
-    return f"{size_of}), for gaps of {gap_m:.1f} m or more{beams if beams_m > side_m else ''}"
-
-
-def _gap_m(rover: RoverSpec, settings: Settings, side_m: float) -> float:
-    return finer_gap_m(rover, settings.mapping, side_m)
+    told = f"{size_of}), for gaps of {open_gap_m(rover, evidence):.1f} m or more"
+    by_beams = _map_at_start(mission, settings, narrow_sight=True)
+    if by_beams is None or by_beams.base.resolution_m <= side_m:
+        return told
+    beams_m, gap_m = by_beams.base.resolution_m, open_gap_m(rover, by_beams)
+    return f"{told}; with single beams alone of {beams_m:.3g} m, for {gap_m:.1f} m"
 
 
 def _maps(mission: Mission, world: SimulatedWorld | None) -> list[str]:
@@ -257,7 +275,7 @@ def _vehicle(mission: Mission, settings: Settings) -> list[str]:
     turns = (
         f"in arcs of {rover.turning_radius_m:g} m radius or wider" if rover.turning_radius_m > 0.0 else "on the spot"
     )
-    lines = [f"rover: radius {rover.radius_m:g} m, cruises at {rover.cruise_speed_m_s:g} m/s, turns {turns}"]
+    lines = [f"rover: {outline_text(rover)}, cruises at {rover.cruise_speed_m_s:g} m/s, turns {turns}"]
     if hint := outline_hint(rover, settings.guidance.controller):
         lines.append(f"note: {hint}")
     if mission.planned_home is not None:
@@ -286,6 +304,19 @@ def place_text(place: Place) -> str:
         return "home"
     north_south = f"{abs(place.north_m):g} m {'south' if place.north_m < 0.0 else 'north'}"
     return f"{north_south}, {abs(place.east_m):g} m {'west' if place.east_m < 0.0 else 'east'} of home"
+
+
+def outline_text(rover: RoverSpec) -> str:
+    """The outline in the words of the file's keys, so that a slip in them is seen; the circle round it."""
+    if rover.rectangle is None:
+        return f"radius {rover.radius_m:g} m"
+    outline = rover.rectangle
+    forward_m = round(0.5 * (outline.front_m - outline.rear_m), 6)
+    middle = f"{abs(forward_m):g} m {'behind' if forward_m < 0.0 else 'ahead of'} the centre of rotation"
+    return (
+        f"{outline.front_m + outline.rear_m:g} m long, {2.0 * outline.half_width_m:g} m wide, its middle "
+        f"{middle if forward_m else 'at the centre of rotation'}, in a circle of radius {rover.radius_m:.3g} m"
+    )
 
 
 def mover_text(mover: MoverSpec) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from companion.diagnosis.finding import Finding, Level, to_set
 from companion.vehicle.events import RoverMode
 from companion.vehicle.gps_fix import NEEDED, GpsFix
+from companion.vehicle.guard import IN_TIME_S
 from companion.vehicle.motion_limits import CRUISE_M_S, LIMITS, THROTTLE_SCALE, full_throttle_m_s
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
@@ -386,9 +387,14 @@ def throttle(seen: Survey) -> Iterator[Finding]:
 
 def guarded(seen: Survey) -> Iterator[Finding]:
     """Whether a guard on the autopilot would stop a rover whose companion has fallen silent."""
-    if seen.vehicle.guard is None:
+    guard = seen.vehicle.guard
+    if guard is None:
         says = "No guard on the autopilot: what the companion told last goes on for 3 s if it dies."
         yield Finding("guard", Level.NOTE, says, "`rover-companion guard` gives a script that ends it after 0.3 s")
+    elif guard.waits_s > IN_TIME_S + 1e-6:
+        says = f"The guard on the autopilot waits {guard.waits_s:g} s"
+        says += f": with more than {IN_TIME_S:g} s planned motions keep more room, as without one."
+        yield Finding("late-guard", Level.NOTE, says, "set SCR_USER1 to 300")
 
 
 def sticks(seen: Survey) -> Iterator[Finding]:

@@ -47,12 +47,13 @@ from companion.executive.mission_progress import (
     stood_still,
     with_requested,
 )
+from companion.executive.open_gaps import open_gap_m
 from companion.executive.return_path import Refuge, Trail, refuges
 from companion.mapping.evidence_map import EvidenceMap, forget, integrate, look_again, move
 from companion.mapping.map_files import save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.do_commands import DoCommand
-from companion.mission.field_size import field_size, finer_gap_m, sure_gap_m
+from companion.mission.field_size import field_size, finer_gap_m
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
@@ -559,10 +560,9 @@ class MissionExecutor:
     def _tell_of_gaps(self) -> None:
         """Which gaps count as closed, and what would open more, where something would."""
         rover, evidence, grid = self._mission.rover, self.evidence, self._mission.grid
-        settings = evidence.settings.model_copy(update={"evidence_m": evidence.evidence_m})
+        settings, side_m = evidence.settings, evidence.base.resolution_m
         size = field_size(rover, settings, narrow_sight=self._scan.is_narrow)
-        side_m = evidence.base.resolution_m
-        gap_m = sure_gap_m(rover, settings, side_m)
+        gap_m = open_gap_m(rover, evidence)
         if size.may_be_finer(side_m):
             fine_m = finer_gap_m(rover, settings, size.fine_m)
             # Evidence for planned motions is finest where fields follow from the rover.

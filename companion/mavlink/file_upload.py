@@ -1,5 +1,8 @@
 """Uploads one file to the autopilot by MAVLink FTP, and compares its checksum.
 
+It is written beside the file that it replaces, and takes its name when it is whole: an upload that ends on the way
+leaves the old one as it was. The card of a board renames no file to a name that is taken, so the old one goes first.
+
 The protocol is in the MAVLink guide, "File Transfer Protocol (FTP)"; the checksum as ArduPilot computes it.
 
 Nouns: file upload.
@@ -25,8 +28,11 @@ from companion.vehicle.events import HeartbeatSeen
 
 HEADER = struct.Struct("<HBBBBBxI")
 """Number, session, operation, size, operation that is answered, end of a burst, (padding), offset."""
-TERMINATE, CREATE, WRITE, CHECKSUM, RESET = 1, 6, 7, 14, 2
+TERMINATE, RESET, CREATE, WRITE, REMOVE, RENAME, CHECKSUM = 1, 2, 6, 7, 8, 13, 14
 ACK, NAK = 128, 129
+UNKNOWN_COMMAND = 7
+BESIDE = ".new"
+"""Behind the name while it is written. The autopilot starts only scripts whose names end with .lua."""
 PIECE_BYTES = 200
 OTHER_COMPONENT = 192
 """A running companion must not see a twin."""
@@ -43,6 +49,7 @@ class UploadEnd(StrEnum):
     SILENT = "the autopilot does not answer file requests"
     NO_FOLDER = "the autopilot has no such folder, or no SD card"
     NOT_WRITTEN = "the autopilot could not write the file"
+    NOT_RENAMED = "the autopilot cannot rename files"
     DIFFERS = "the file is not on the autopilot as it was sent"
 
 
@@ -62,15 +69,17 @@ class FileUpload:
         self._mav: Any = mavlink.MAVLink(None)
         self._places = list(places)
         self._data = data
-        self._number = 0
+        self._number = self._session = 0
         self._sent_s, self._tries = -math.inf, 0
         self._step = _Step(RESET, 0, b"")
         self.end: UploadEnd | None = None
         """None while it goes on."""
+        self.removed = False
+        """Whether the file that was there may be gone."""
 
     @property
     def place(self) -> str:
-        """The path that is written."""
+        """The path that the file gets."""
         return self._places[0] if self._places else ""
 
     @property
@@ -101,7 +110,8 @@ class FileUpload:
             return
         self._sent_s, self._tries = now_s, self._tries + 1
         operation, offset, data = self._step
-        header = HEADER.pack(self._number, 0, operation, len(data), 0, 0, offset)
+        self.removed |= operation == REMOVE
+        header = HEADER.pack(self._number, self._session, operation, len(data), 0, 0, offset)
         for raw in self._codec.encode_packets(FileRequest(header + data)):
             self._link.write(raw)
 
@@ -110,9 +120,12 @@ class FileUpload:
         if (packet.system_id, packet.component_id) != (self._codec.system_id, AUTOPILOT) or self.end is not None:
             return
         payload = bytes(self._mav.decode(bytearray(packet.raw)).payload)
-        number, _, result, size, answered, _, _ = HEADER.unpack_from(payload)
+        number, session, result, size, answered, _, _ = HEADER.unpack_from(payload)
         if number != (self._number + 1) % 65536 or answered != self._step.operation or result not in (ACK, NAK):
             return
+        if answered == CREATE:
+            # Some autopilots give a session of their own.
+            self._session = session
         following = self._after(payload[HEADER.size : HEADER.size + size], refused=result == NAK)
         if isinstance(following, UploadEnd):
             self.end = following
@@ -133,12 +146,31 @@ class FileUpload:
         if operation == WRITE:
             return UploadEnd.NOT_WRITTEN if refused else self._write(offset + len(data))
         if operation == TERMINATE:
-            return _Step(CHECKSUM, 0, self.place.encode() + b"\0")
+            return self._checksum(self.place + BESIDE)
+        if operation == REMOVE:
+            return self._rename()
+        if operation == RENAME:
+            unknown = refused and answer[:1] == bytes([UNKNOWN_COMMAND])
+            return UploadEnd.NOT_RENAMED if unknown else self._checksum(self.place)
+        return self._compared(answer, refused=refused)
+
+    def _compared(self, answer: bytes, *, refused: bool) -> _Step | UploadEnd:
+        """What follows a checksum. A repeated request may be refused that was done: what is there counts."""
         same = not refused and len(answer) >= 4 and struct.unpack_from("<I", answer)[0] == checksum(self._data)
-        return UploadEnd.DONE if same else UploadEnd.DIFFERS
+        if self._step.data == self._checksum(self.place).data:
+            if same:
+                return UploadEnd.DONE
+            return UploadEnd.DIFFERS if self.removed else _Step(REMOVE, 0, self.place.encode())
+        return self._rename() if same else UploadEnd.DIFFERS
 
     def _create(self) -> _Step:
-        return _Step(CREATE, 0, self.place.encode() + b"\0")
+        return _Step(CREATE, 0, (self.place + BESIDE).encode() + b"\0")
+
+    def _checksum(self, path: str) -> _Step:
+        return _Step(CHECKSUM, 0, path.encode() + b"\0")
+
+    def _rename(self) -> _Step:
+        return _Step(RENAME, 0, (self.place + BESIDE).encode() + b"\0" + self.place.encode())
 
     def _write(self, offset: int) -> _Step:
         piece = self._data[offset : offset + PIECE_BYTES]

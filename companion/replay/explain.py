@@ -291,7 +291,7 @@ def motion_lines(choice: MotionChoice) -> list[str]:
         lines.append(f"  {rank + 1:4d}. {_motion_text(choice, order[rank])}")
     told = choice.told
     lines.append(
-        f"chosen: cost {choice.found.cost_s:.2f} s; the controller's command: {told.speed_m_s:.2f} m/s, "
+        f"chosen: {_motion_cost_text(choice.found.cost_s)}; the controller's command: {told.speed_m_s:.2f} m/s, "
         f"{math.degrees(told.turn_rad_s):.0f} deg/s. Making way and the last look may send less: "
         "report --csv says what was sent"
     )
@@ -305,9 +305,12 @@ def _motion_text(choice: MotionChoice, one: int) -> str:
     motion, cost_s = choice.found.judged[one], float(choice.found.costs_s[one])
     way = way_of(motion, choice.problem)
     far_m = float(np.hypot(*(way[-1] - way[0])))
-    cost = "touches something" if cost_s >= BLOCKED_S else f"cost {cost_s:.2f} s"
     begins, ends = (f"{speed:.2f} m/s, {math.degrees(turn):.0f} deg/s" for speed, turn in motion[[0, -1]])
-    return f"{cost}: begins with {begins}, ends with {ends}, {far_m:.1f} m away"
+    return f"{_motion_cost_text(cost_s)}: begins with {begins}, ends with {ends}, {far_m:.1f} m away"
+
+
+def _motion_cost_text(cost_s: float) -> str:
+    return "touches something" if cost_s >= BLOCKED_S else f"cost {cost_s:.2f} s"
 
 
 def cost_text(candidate: Candidate) -> str:

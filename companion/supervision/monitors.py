@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from companion.control.braking import GUARD_SLACK_S
-from companion.control.following import GUARDED_S
 from companion.core.severity import TextSink
 from companion.executive.autopilot_mission import MissionChangeMonitor
 from companion.executive.mission_run import MissionRun
@@ -26,6 +24,7 @@ from companion.supervision.limits_monitor import LimitsMonitor
 from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.supervision.mission_limits import BorderMonitor
 from companion.supervision.rival_monitor import RivalMonitor
+from companion.vehicle.guard import IN_TIME_S
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -67,7 +66,7 @@ def make_monitors(
         BorderMonitor(run),
         gate,
         batteries,
-        GuardMonitor(notifier, GUARDED_S - GUARD_SLACK_S),
+        GuardMonitor(notifier, IN_TIME_S),
         LidarTroubleMonitor(wired, notifier),
         LimitsMonitor(autopilot, live, notifier),
         MissionChangeMonitor(run.mission.stored, autopilot.downloads, notifier),

@@ -15,6 +15,8 @@ NAME = "CMPGRD"
 waits, negative while the present HOLD is its doing."""
 FRESH_S = 1.3
 """It speaks twice a second; without a word for so long it is not there."""
+IN_TIME_S = 0.95
+"""With a guard that waits longer, motions are planned with more room, as without one."""
 FILE = "companion_guard.lua"
 COMPONENT = 191
 

@@ -1,5 +1,7 @@
 """MAVLink FTP of a vehicle whose only folder is ``scripts``: files can be written there, and no file can be read.
 
+A file is renamed only to a name that is free, as on the cards of boards (FAT).
+
 A ground station that first asks for a file of parameters or missions (`@PARAM/param.pck`) then falls back to the list
 at once, instead of repeating its request for ten seconds.
 """
@@ -20,13 +22,13 @@ HEADER = struct.Struct("<HBBBBBxI")
 
 PAYLOAD_BYTES = 251
 
-TERMINATE, RESET, READ, CREATE, WRITE, CHECKSUM, BURST = 1, 2, 5, 6, 7, 14, 15
+TERMINATE, RESET, READ, CREATE, WRITE, REMOVE, RENAME, CHECKSUM, BURST = 1, 2, 5, 6, 7, 8, 13, 14, 15
 
 OF_A_SESSION, OPERATIONS = {READ, WRITE, BURST}, range(1, 16)
 
 ACK, NAK = 128, 129
 
-INVALID_SESSION, UNKNOWN_COMMAND, FILE_NOT_FOUND, FULL = 4, 7, 10, 1
+INVALID_SESSION, UNKNOWN_COMMAND, FILE_EXISTS, FILE_NOT_FOUND, FULL = 4, 7, 8, 10, 1
 
 SCRIPTS = "scripts/"
 
@@ -51,7 +53,7 @@ def answer_file_request(vehicle: Vehicle, channel: Channel, message: Any) -> Non
 def _done(vehicle: Vehicle, operation: int, data: bytes, offset: int) -> tuple[int, bytes]:
     """Do it: an error code, 0 for none, and what is answered."""
     card = vehicle.storage
-    path = data.split(b"\0")[0].decode("ascii", "replace")
+    path, other = f"{data.decode('ascii', 'replace')}\0\0".split("\0")[:2]
     if operation in (TERMINATE, RESET):
         card.open_file = ""
     elif operation == CREATE:
@@ -63,6 +65,12 @@ def _done(vehicle: Vehicle, operation: int, data: bytes, offset: int) -> tuple[i
         if offset > len(file) or offset + len(data) > MOST_BYTES:
             return FULL, b""
         file[offset : offset + len(data)] = data
+    elif operation == REMOVE and path in card.files:
+        del card.files[path]
+    elif operation == RENAME and path in card.files and other.startswith(SCRIPTS):
+        if other in card.files:
+            return FILE_EXISTS, b""
+        card.files[other] = card.files.pop(path)
     elif operation == CHECKSUM and path in card.files:
         # ArduPilot's has none of the usual inversions.
         return 0, struct.pack("<I", zlib.crc32(card.files[path], 0xFFFFFFFF) ^ 0xFFFFFFFF)

@@ -88,7 +88,8 @@ class Guard:
 
 def guard_of(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool]) -> Guard | None:
     """The guard of an autopilot that has just booted; None if it has none."""
-    found = next((found for file in vehicle.storage.files.values() if (found := WATCHES.search(file))), None)
+    scripts = [file for path, file in vehicle.storage.files.items() if path.endswith(".lua")]
+    found = next((found for file in scripts if (found := WATCHES.search(file))), None)
     there = vehicle.parameters["SCR_USER1"] > 0 or found is not None
     if not there or vehicle.parameters["SCR_ENABLE"] != 1:
         return None

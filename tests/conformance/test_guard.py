@@ -228,6 +228,8 @@ def test_the_simulators_guard_watches_the_component_of_the_script_that_was_uploa
     vehicle: Any = SimpleNamespace(parameters={"SCR_USER1": 0.0, "SCR_ENABLE": 1.0}, storage=storage)
     made = guard_of(vehicle, lambda *_: True)
     assert made is not None and made._component_id == 195
+    storage.files = {"scripts/companion_guard.lua.new": script(195).encode()}
+    assert guard_of(vehicle, lambda *_: True) is None, "an upload that did not end is started by nobody"
 
 
 STEPS = st.one_of(

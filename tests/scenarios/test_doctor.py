@@ -23,12 +23,13 @@ from companion.control.model_estimate import ModelEstimate
 from companion.core.frames import LocalFrame, NedPoint
 from companion.diagnosis.checks import PARAMETERS, diagnose
 from companion.diagnosis.finding import Level
+from companion.executive.open_gaps import map_at_start, open_gap_m
 from companion.mavlink.byte_link import MemoryLink
 from companion.mavlink.signing import Signer
 from companion.mavlink.surveyor import Surveyor
 from companion.mission.given import Given
 from companion.mission.load import load_mission
-from companion.settings import Settings
+from companion.settings import Settings, parse_settings
 from sitl.scenario import scenario_from_mission
 from tests.sitl.network.test_server import free_port
 from tests.support.mavlink_vehicle import Station
@@ -380,6 +381,23 @@ def test_a_mission_is_looked_at_from_where_the_rovers_home_is(tmp_path: Path) ->
         assert line == f"mission m: 1 target; {is_so}"
         assert [(one.name, one.level) for one in findings] == found
         assert all("\n" not in one.says and one.remedy for one in findings)
+
+
+@pytest.mark.parametrize("turning_radius_m", [0.0, 2.0])
+def test_gaps_are_those_of_the_map_that_the_run_would_lay(tmp_path: Path, turning_radius_m: float) -> None:
+    """On large ground cells are larger than they are wanted; for a rover that needs arcs no motions are planned."""
+    case = Case(tmp_path)
+    case.findings()
+    home = case.result.vehicle.home
+    assert home is not None
+    rover = f"[rover]\nturning_radius_m = {turning_radius_m}\n"
+    (tmp_path / "m.toml").write_text(f"{rover}[[target]]\nnorth_m = 250\neast_m = 250\n")
+    mission, settings = load_mission(tmp_path / "m.toml"), Settings()
+    planned = parse_settings({"guidance": {"controller": "motion-ga"}}, "test")
+    led = settings if turning_radius_m else planned
+    (fields,) = of_mission(mission, case.result, planned)
+    gap_m = open_gap_m(mission.rover, map_at_start(mission, led, home.point, narrow_sight=False))
+    assert f"through gaps of {gap_m:.1f} m or more" in fields.says
 
 
 def test_what_run_would_refuse_of_a_mission_is_found_and_options_are_those_of_run(tmp_path: Path) -> None:

@@ -6,12 +6,14 @@ import math
 import socket
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
+from companion.mavlink.file_upload import UploadEnd
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.recording.recorder import NullRecorder
@@ -98,6 +100,16 @@ def test_it_is_printed_written_and_uploaded_and_works_after_a_restart(tmp_path: 
     written = CliRunner().invoke(app, ["guard", "--write", str(tmp_path)])
     assert (printed.exit_code, written.exit_code) == (0, 0)
     assert (tmp_path / "companion_guard.lua").read_text(encoding="utf-8") == printed.output == script()
+
+
+@pytest.mark.parametrize("removed", [True, False])
+def test_an_upload_that_may_have_removed_the_script_says_so(monkeypatch: pytest.MonkeyPatch, removed: bool) -> None:
+    end = SimpleNamespace(end=UploadEnd.SILENT, heard=True, removed=removed)
+    monkeypatch.setattr("companion.cli.guard.FileUpload", lambda *_: end)
+    url = f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
+    answer = CliRunner().invoke(app, ["guard", "--install", url])
+    assert answer.exit_code == 3 and len(answer.output.strip().splitlines()) == 1
+    assert ("may be gone: install it again before you restart" in answer.output) is removed
 
 
 def test_nobody_there_and_a_place_that_cannot_be_written_are_told_in_a_line(

@@ -7,6 +7,10 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
+from companion.core.frames import GeoPoint
+from companion.executive.open_gaps import map_at_start, open_gap_m
+from companion.mission.load import load_mission
+from companion.settings import load_settings
 
 MISSIONS = Path(__file__).resolve().parents[3] / "missions"
 
@@ -18,7 +22,7 @@ SHIPPED = sorted(path for path in MISSIONS.iterdir() if path.suffix in (".toml",
 def test_every_shipped_mission_is_understood(path: Path) -> None:
     result = CliRunner().invoke(app, ["mission", "check", str(path)])
     assert result.exit_code == 0
-    assert "grid:" in result.output and "rover: radius" in result.output
+    assert "grid:" in result.output and "rover: " in result.output
 
 
 def test_it_says_what_was_understood(tmp_path: Path) -> None:
@@ -167,6 +171,37 @@ def test_it_checks_with_the_settings_that_the_mission_is_to_be_driven_with(tmp_p
     assert "fields of 1 m (as single beams need)" in checked(mission, "--settings", str(settings))
     nowhere = CliRunner().invoke(app, ["mission", "check", str(mission), "--settings", str(tmp_path / "no.toml")])
     assert nowhere.exit_code == 2 and len(nowhere.output.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("side_m", "north_m"), [(0.3, 30), (0.25, 180)])
+def test_with_fields_of_a_given_size_the_gaps_are_those_of_the_map_as_it_is_laid(
+    tmp_path: Path, side_m: float, north_m: float
+) -> None:
+    """On the larger ground evidence is coarser than it is wanted."""
+    mission, faster = tmp_path / "m.toml", tmp_path / "faster.toml"
+    faster.write_text('[guidance]\ncontroller = "motion-ga"\n')
+    rover = "[rover]\nlength_m = 0.9\nwidth_m = 0.7\n"
+    target = f"[[target]]\nnorth_m = {north_m}\neast_m = {north_m}\n"
+    mission.write_text(f"{rover}[grid]\nresolution_m = {side_m}\n{target}")
+    evidence = map_at_start(load_mission(mission), load_settings(faster), GeoPoint(0.0, 0.0), narrow_sight=False)
+    gap_m = open_gap_m(load_mission(mission).rover, evidence)
+    told = f"fields of {side_m:g} m, for gaps of {gap_m:.1f} m or more"
+    assert told in checked(mission, "--settings", str(faster))
+    place = "lat_deg = 53.1\nlon_deg = 23.2\n"
+    mission.write_text(f"{rover}[grid]\nresolution_m = {side_m}\n[[target]]\n{place}")
+    assert f"fields of {side_m:g} m, for gaps of " in checked(mission, "--settings", str(faster))
+
+
+@pytest.mark.parametrize(
+    ("forward_m", "middle"),
+    [(0.1, "0.1 m ahead of the centre"), (-0.1, "0.1 m behind the centre"), (0.0, "at the centre")],
+)
+def test_it_says_the_outline_by_which_a_slip_in_its_keys_is_seen(tmp_path: Path, forward_m: float, middle: str) -> None:
+    path = tmp_path / "m.toml"
+    rover = f"[rover]\nlength_m = 0.9\nwidth_m = 0.7\ncentre_forward_m = {forward_m}\n"
+    path.write_text(f"{rover}[[target]]\nnorth_m = 30\neast_m = 0\n")
+    output = checked(path)
+    assert f"rover: 0.9 m long, 0.7 m wide, its middle {middle} of rotation, in a circle of radius 0." in output
 
 
 def test_options_say_what_a_ground_stations_file_cannot() -> None:

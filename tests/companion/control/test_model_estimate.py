@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
+from companion.control import model_estimate
 from companion.control.following import AS_SHIPPED, Following, following_of
 from companion.control.local_view import LocalView
-from companion.control.model_estimate import KNOWN_S, ModelEstimate, ModelEstimator, described
+from companion.control.model_estimate import GAP_S, KNOWN_S, ModelEstimate, ModelEstimator, described
 from companion.control.told import Told, after
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
@@ -100,6 +102,24 @@ def test_a_rover_that_is_told_to_stand_tells_nothing_of_its_dead_time(noise: flo
 
 def test_nothing_told_nothing_learnt() -> None:
     assert watched(Following(0.5, 0.6, 0.6, 1.2, 0.8), 20.0, told=False).estimate.figures == AS_SHIPPED
+
+
+def test_moments_that_are_far_apart_do_not_belong_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second before a pause and a second after it are too little to learn from."""
+    looked = list[int]()
+
+    def fitted(before: ModelEstimate, rows: NDArray[np.float64]) -> ModelEstimate:
+        looked.append(len(rows))
+        return before
+
+    monkeypatch.setattr(model_estimate, "_fitted", fitted)
+    estimator, lately, now_s = ModelEstimator(AS_SHIPPED), Told(), 100.0
+    for tick in range(40):
+        now_s += 2.0 * GAP_S if tick == 20 else TICK_S
+        lately = after(lately, GuidedVelocity(1.0, 0.0), now_s)
+        pose = Pose(0.0, 0.0, 0.0, now_s)
+        estimator.note(LocalView(pose, 1.0, EVIDENCE, LIMITS, SETTINGS, 0.0, lately=lately))
+    assert looked == []
 
 
 def test_no_figure_leaves_its_bounds() -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from companion.control import motion_controller
-from companion.control.controller import Purpose
+from companion.control.controller import ControlCommand, Purpose
 from companion.control.following import AS_SHIPPED, Following, turn_gains, within_limits
 from companion.control.local_view import LocalView
 from companion.control.motion_controller import (
@@ -19,9 +20,11 @@ from companion.control.motion_controller import (
     _latest,
     rover_model,
 )
+from companion.control.motion_ground import AROUND_M, Window, look_round
 from companion.control.motion_kernels import MotionProblem, clearance_m, moved
 from companion.control.motion_planners import Found, motion_planner
 from companion.control.motion_prediction import braked_m
+from companion.control.position_ahead import PositionAhead
 from companion.control.reference_path import ReferencePath, advanced
 from companion.control.told import Told, ToldVelocity, after
 from companion.core.footprint import Footprint
@@ -413,12 +416,57 @@ class Wants:
         motion = np.zeros((6, 2))
         motion[:, 0] = speed_m_s
         self._found = Found(motion, 1.0, motion[None], np.ones(1))
+        self.forgotten = 0
 
     def plan(self, problem: MotionProblem, passed_s: float) -> Found:
         return self._found
 
     def forget(self) -> None:
-        pass
+        self.forgotten += 1
+
+
+def test_a_void_path_leaves_nothing_of_what_was_planned_seen_and_led_along_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    looks, led = [], list[PositionAhead]()
+
+    class Ahead(PositionAhead):
+        def faster_than(self, speed_m_s: float, path: ReferencePath, view: LocalView) -> ControlCommand | None:
+            led.append(self)
+            return None
+
+    def look(*args: Any, **more: Any) -> Window:
+        looks.append(args)
+        return look_round(*args, **more)
+
+    monkeypatch.setattr(motion_controller, "PositionAhead", Ahead)
+    monkeypatch.setattr(motion_controller, "look_round", look)
+    planner = Wants(0.4)
+    leads, at = MotionController(FOOTPRINT, planner), view(ground(), Pose(5.0, 10.0, 0.0, 0.0))
+    for _ in range(2):
+        leads.follow(PATH, at)
+    assert (len(looks), planner.forgotten, led[0] is led[1]) == (1, 0, True), "the same moment, and the same path"
+    leads.reset()
+    leads.follow(PATH, at)
+    assert (len(looks), planner.forgotten, led[1] is led[2]) == (2, 1, False)
+
+
+def test_it_says_whether_the_rover_rolled_tail_first() -> None:
+    """Who judges what comes across the way asks for it."""
+    leads, at = controller(), view(ground(), Pose(5.0, 10.0, 0.0, 0.0), 0.3)
+    for rolls_back in (True, False):
+        leads.follow(PATH, replace(at, rolls_back=rolls_back))
+        assert leads.backwards is rolls_back
+
+
+def test_it_looks_as_far_as_where_the_rover_would_come_to_stand() -> None:
+    """With the path behind it that lies beyond all else that is looked at."""
+    path, leads = ReferencePath(PATH.points[:9][::-1].copy()), controller()
+    at = view(ground(), Pose(8.0, 10.0, 0.0, 0.0), 2.0)
+    leads.follow(path, at)
+    assert leads.choice is not None
+    seen = leads.choice.problem.ground
+    north_m = leads.choice.corner.north_m + len(seen.gap_m) * seen.cell_m
+    stops_m = 2.0**2 / (2.0 * at.following.deceleration_m_s2)
+    assert north_m > 8.0 + AROUND_M + stops_m
 
 
 @pytest.mark.parametrize("wanted_m_s", [0.4, -0.4])

@@ -95,6 +95,7 @@ CASES: list[tuple[str, Level, Survey]] = [
     ("cruise-throttle", W, with_set(CRUISE_SPEED=1.0, CRUISE_THROTTLE=75.0)),
     ("cruise-throttle", W, with_set(CRUISE_SPEED=3.0, CRUISE_THROTTLE=0.0)),
     ("guard", N, with_state(guard=None)),
+    ("late-guard", N, with_state(guard=GuardSeen(0.0, 1.0, False))),
     ("port-shared", S, replace(WELL, rivals=("cat (process 7)",), bad_bytes=900, read_bytes=1000)),
     ("port-damaged", W, replace(WELL, bad_bytes=60, read_bytes=1000)),
     ("points-frame", W, replace(WELL, sources=(replace(CAMERA, frame=1, blind=True),))),
@@ -256,3 +257,10 @@ def test_a_fix_that_is_worse_than_asked_for_or_not_told_would_stop_a_mission(
     found = diagnose(replace(WELL, vehicle=replace(WELL.vehicle, gps=seen)), gps_fix)
     assert [(one.name, one.level) for one in found] == ([("gps-fix", Level.STOP)] if stops else [])
     assert all(one.remedy and gps_fix in one.says for one in found)
+
+
+@pytest.mark.parametrize(("waits_s", "late"), [(0.95, False), (0.951, True)])
+def test_a_guard_is_late_from_the_limit_on_with_which_motions_keep_more_room(waits_s: float, late: bool) -> None:
+    found = diagnose(with_state(guard=GuardSeen(0.0, waits_s, False)))
+    assert [one.name for one in found] == ["late-guard"] * late
+    assert all(f"{waits_s:g} s" in one.says and "SCR_USER1 to 300" in one.remedy for one in found)

@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from companion.control.controller import STANDSTILL
+from companion.control.drag import DragWatch
+from companion.control.local_view import LocalView
 from companion.control.point_controller import ControlCommand
-from companion.executive.mission_executor import MissionTask
+from companion.executive.mission_executor import MissionExecutor, MissionTask
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.mission_run import LocatedScan, MissionRun, Order, Stop
 from companion.safety.mode_latch import Reaction, Verdict
@@ -90,6 +92,20 @@ def test_positions_come_nearer_where_the_throttle_is_open_and_the_rover_stands(t
                 places_m.append(pose.point.distance_m(command.setpoint.point))
         ways_m[share] = places_m[-1] - places_m[0]
     assert ways_m[0.4] < -0.15 and ways_m[0.0] == pytest.approx(0.0, abs=0.05)
+
+
+@pytest.mark.parametrize("misleads", [True, False])
+def test_nothing_is_learnt_of_a_rover_that_the_ground_drags(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, misleads: bool
+) -> None:
+    learnt = list[LocalView]()
+    monkeypatch.setattr(DragWatch, "misleads", lambda self: misleads)
+    monkeypatch.setattr(MissionExecutor, "learn", lambda self, view: learnt.append(view))
+    desk = Desk(tmp_path)
+    desk.begin()
+    desk.stand(0.0, 0.0)
+    desk.run.guide(desk.run.decide(DRIVE, desk.now_s), desk.now_s)
+    assert len(learnt) == (not misleads)
 
 
 @pytest.mark.parametrize("stands", ["stopped", "ending"])

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import random
+from typing import Any
 
 import pytest
 
 from companion.mavlink.byte_link import MemoryLink
 from companion.mavlink.file_upload import FileUpload, UploadEnd, checksum
 from companion.settings import Settings
+from sitl.autopilot import ftp
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.messages import HANDLERS
+from sitl.autopilot.vehicle import Vehicle
 from tests.support.sitl_client import open_ground
 
 DATA = bytes(range(256)) * 5
@@ -65,6 +70,75 @@ def test_an_armed_rover_is_left_alone() -> None:
     line.simulator.vehicle.armed = True
     assert line.run(FileUpload(line.near, Settings().link, ["scripts/a.lua"], DATA)) is UploadEnd.ARMED
     assert line.simulator.vehicle.storage.files == {}
+
+
+OLD = b"local COMPANION = 191"
+LONG = DATA * 20
+"""It takes longer than a second, after which the rover says whether it is armed."""
+
+
+@pytest.mark.parametrize("lost_share", [0.0, 0.3])
+def test_the_file_that_was_there_is_replaced(lost_share: float) -> None:
+    line = Line(lost_share)
+    files = line.simulator.vehicle.storage.files
+    files["scripts/a.lua"] = bytearray(OLD)
+    assert line.run(FileUpload(line.near, Settings().link, ["scripts/a.lua"], DATA)) is UploadEnd.DONE
+    assert files == {"scripts/a.lua": bytearray(DATA)}
+
+
+def test_an_upload_that_ends_on_the_way_leaves_the_file_that_was_there() -> None:
+    line = Line()
+    files = line.simulator.vehicle.storage.files
+    files["scripts/a.lua"] = bytearray(OLD)
+    upload = FileUpload(line.near, Settings().link, ["scripts/a.lua"], LONG)
+    while not files.get("scripts/a.lua.new") and upload.end is None:
+        line.run(upload, STEP_S)
+    line.simulator.vehicle.armed = True
+    assert line.run(upload) is UploadEnd.ARMED and not upload.removed
+    assert 0 < len(files["scripts/a.lua.new"]) < len(LONG)
+    assert files["scripts/a.lua"] == OLD
+    line.simulator.vehicle.armed = False
+    line.simulator.advance_to_s(line.simulator.time_s + 2.0)
+    assert line.run(FileUpload(line.near, Settings().link, ["scripts/a.lua"], DATA)) is UploadEnd.DONE
+    assert files == {"scripts/a.lua": bytearray(DATA)}
+
+
+def test_whoever_ends_while_names_change_hears_that_the_old_file_may_be_gone() -> None:
+    line = Line()
+    files = line.simulator.vehicle.storage.files
+    files["scripts/a.lua"] = bytearray(OLD)
+    upload = FileUpload(line.near, Settings().link, ["scripts/a.lua"], DATA)
+    while "scripts/a.lua" in files and upload.end is None:
+        line.run(upload, 0.5 * STEP_S)
+    upload.give_up()
+    assert upload.end is UploadEnd.SILENT and upload.removed
+
+
+def test_an_autopilot_that_cannot_rename_keeps_the_old_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sitl.autopilot.ftp.RENAME", 99)
+    monkeypatch.setattr("sitl.autopilot.ftp.OPERATIONS", set(range(1, 13)) | {14, 15})
+    line = Line()
+    files = line.simulator.vehicle.storage.files
+    files["scripts/a.lua"] = bytearray(OLD)
+    assert line.run(FileUpload(line.near, Settings().link, ["scripts/a.lua"], DATA)) is UploadEnd.NOT_RENAMED
+    assert files["scripts/a.lua"] == OLD
+
+
+def test_the_session_is_the_one_that_the_autopilot_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newer firmware opens files in sessions of its own numbers."""
+    line, asked, answer = Line(), list[tuple[int, int]](), ftp.answer_file_request
+
+    def with_session(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+        request = bytearray(message.payload)
+        asked.append((request[3], request[2]))
+        if request[3] == ftp.CREATE:
+            request[2] = 7
+        message.payload = bytes(request)
+        answer(vehicle, channel, message)
+
+    monkeypatch.setitem(HANDLERS, "FILE_TRANSFER_PROTOCOL", with_session)
+    assert line.run(FileUpload(line.near, Settings().link, ["scripts/a.lua"], DATA)) is UploadEnd.DONE
+    assert {session for operation, session in asked if operation == ftp.WRITE} == {7}
 
 
 def test_an_autopilot_that_does_not_answer_is_given_up() -> None:

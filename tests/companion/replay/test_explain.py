@@ -12,7 +12,9 @@ from companion.core.grid import Cell, empty_grid
 from companion.navigation.field_step import NavState
 from companion.planning.problem import Path
 from companion.planning.raster import CellArray
-from companion.replay.explain import Candidate, _rest_of_path, _Scene, cost_of, cost_text
+from companion.replay.explain import Candidate, _rest_of_path, _Scene, cost_of, cost_text, motion_lines
+from tests.companion.control.test_motion_controller import controller, view
+from tests.companion.control.test_motion_ground import PATH, ground
 
 
 def cells(*pairs: tuple[int, int]) -> CellArray:
@@ -50,3 +52,15 @@ def test_what_is_left_of_a_path_begins_where_the_rover_is_and_costs_what_the_nav
     rest = _rest_of_path(scene)
     assert rest.path is not None and rest.path.cells == tuple(Cell(x, 0) for x in range(here.x, 5)) and here.x > 0
     assert rest.cost == cost_of(grid, rest.path.cell_array) < path.cost and rest.note == "clear"
+
+
+@pytest.mark.parametrize("shut_in", [True, False])
+def test_a_chosen_motion_that_touches_something_is_called_so(shut_in: bool) -> None:
+    """As in the list above it: a cost of more than a thousand seconds stands for that."""
+    leads, evidence = controller(), ground()
+    if shut_in:
+        evidence.log_odds[:] = 3.0
+    leads.follow(PATH, view(evidence, Pose(3.0, 10.0, 0.0, 0.0), 1.0))
+    assert leads.choice is not None
+    (chosen,) = [line for line in motion_lines(leads.choice) if line.startswith("chosen: ")]
+    assert chosen.startswith("chosen: touches something; the controller" if shut_in else "chosen: cost ")

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from companion.control.braking import for_guard
+from companion.control.braking import GUARD_SLACK_S, for_guard
 from companion.control.following import GUARDED_S
 from companion.core.severity import Severity
 from companion.safety.guard_monitor import GuardMonitor
 from companion.settings import Settings
 from companion.vehicle.commands import StatusText
 from companion.vehicle.events import Event, GuardSeen, TextSeen
+from companion.vehicle.guard import IN_TIME_S
 from companion.vehicle.state import VehicleState, fold
 from tests.support.whole import Whole
 
@@ -80,3 +81,4 @@ def test_what_is_said_is_the_rule_in_force(tmp_path: Path, waits_s: float, says:
     assert [text.startswith(says) for text in texts if "guard" in text.lower()] == [True]
     lasts_s = for_guard(Settings(), waits_s).guidance.velocity_lasts_s
     assert (lasts_s <= GUARDED_S) is (says == "Guarded: ")
+    assert pytest.approx(GUARDED_S - GUARD_SLACK_S) == IN_TIME_S, "what is said is said by the same limit"
