@@ -18,7 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from companion.core.own_parts import OwnKind, OwnPartError, looks_own, source_of
+from companion.core.own_parts import OwnKind, looks_own, source_of
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
@@ -72,10 +72,11 @@ class RunStore:
             if check != _check_of(body):
                 raise ValueError("check sum")
             spec, result = RunSpec(**body["run"]), _result(body["result"])
-        except (ValueError, KeyError, TypeError, AttributeError):
+            is_ours = body["digest"] == self._digests(spec)
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             self.torn += 1
             return
-        if body["digest"] != self._digests(spec):
+        if not is_ours:
             self.older += 1
         elif result.outcome != ERROR:  # what failed on one machine for want of memory is driven again
             self.results.setdefault(spec.id, result)
@@ -90,7 +91,7 @@ class Digests:
         self._known: dict[tuple[str, ...], str] = {}
 
     def of(self, spec: RunSpec) -> str:
-        """That of a run; empty where one of its files cannot be read."""
+        """That of a run; empty where one of its files cannot be read, or where it says what this code does not know."""
         key = (spec.world, spec.planner, spec.controller, spec.sensors, spec.faults)
         if key not in self._known:
             digest = hashlib.sha256(code_digest().encode() + _libraries().encode())
@@ -98,7 +99,7 @@ class Digests:
                 for file in _files(spec, self.folder):
                     digest.update(file.name.encode() + read_at_most(file, MOST_BYTES))
                 self._known[key] = digest.hexdigest()[:16]
-            except (OSError, MissionError, MapError, OwnPartError):
+            except (OSError, MissionError, MapError, ValueError):
                 self._known[key] = ""
         return self._known[key]
 
