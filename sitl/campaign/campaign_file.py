@@ -159,9 +159,7 @@ def _check_once(path: Path, folder: Path, table: CampaignTable) -> None:
     meanings: dict[str, list[Any]] = {
         "worlds": [GroundSpec.of(world) or (folder / world).resolve() for world in table.worlds],
         "sensors": [SensorSpec.of(sensors) for sensors in table.sensors],
-        "faults": [
-            plan if plan == NOTHING else replace(faults_of(plan, folder), source="") for plan in table.faults
-        ],
+        "faults": [plan if plan == NOTHING else replace(faults_of(plan, folder), source="") for plan in table.faults],
         **{axis: getattr(table, axis) for axis in ("planners", "controllers", "guard", "off_model", "late_s")},
     }
     for axis, values in meanings.items():

@@ -32,6 +32,8 @@ from sitl.experiments.experiment import code_digest
 from sitl.generators.measures import Difficulty
 
 MOST_BYTES = 2_000_000_000
+UNREADABLE = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
+"""What a line raises that was torn, or written by something else."""
 
 
 class RunStore:
@@ -46,7 +48,7 @@ class RunStore:
         self.older = 0
         """Lines of other code or other files."""
         self._digests = digests
-        for line in _lines(file):
+        for line in _lines(file, repair=True):
             self._take(line)
 
     def add(self, spec: RunSpec, result: RunResult) -> None:
@@ -67,19 +69,31 @@ class RunStore:
 
     def _take(self, line: str) -> None:
         try:
-            body: dict[str, Any] = json.loads(line)
-            check = body.pop("check")
-            if check != _check_of(body):
-                raise ValueError("check sum")
+            body = _body_of(line)
             spec, result = RunSpec(**body["run"]), _result(body["result"])
             is_ours = body["digest"] == self._digests(spec)
-        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        except UNREADABLE:
             self.torn += 1
             return
         if not is_ours:
             self.older += 1
         elif result.outcome != ERROR:  # what failed on one machine for want of memory is driven again
             self.results.setdefault(spec.id, result)
+
+
+def kept_run(file: Path, run_id: str) -> RunSpec | None:
+    """The run of this name that a file has, whatever code has driven it; None: it has none.
+
+    Raises CampaignError when the file cannot be read.
+    """
+    for line in _lines(file):
+        try:
+            body = _body_of(line)
+            if body["id"] == run_id:
+                return RunSpec(**body["run"])
+        except UNREADABLE:
+            continue
+    return None
 
 
 class Digests:
@@ -120,16 +134,25 @@ def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
     yield from (source for source in sources if source is not None)
 
 
-def _lines(file: Path) -> list[str]:
+def _lines(file: Path, *, repair: bool = False) -> list[str]:
+    """``repair``: nobody else writes to it."""
     try:
         data = read_at_most(file, MOST_BYTES) if file.exists() else b""
-        if data and not data.endswith(b"\n"):
+        if repair and data and not data.endswith(b"\n"):
             # A line that was torn: the next one must not be appended to it.
             with file.open("ab") as out:
                 out.write(b"\n")
     except OSError as error:
         raise CampaignError(f"{file}: cannot be used: {error.strerror}; choose another folder with --out") from error
     return data.decode("utf-8", errors="replace").splitlines()
+
+
+def _body_of(line: str) -> dict[str, Any]:
+    """Raises one of ``UNREADABLE``."""
+    body: dict[str, Any] = json.loads(line)
+    if body.pop("check") != _check_of(body):
+        raise ValueError("check sum")
+    return body
 
 
 def _result(values: dict[str, Any]) -> RunResult:
