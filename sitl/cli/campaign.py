@@ -25,7 +25,7 @@ from sitl.campaign.run_store import Digests, RunStore, kept_run
 from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
-from sitl.cli.extras import statistics_fault
+from sitl.cli.extras import parquet_fault, statistics_fault
 from sitl.cli.runs import FILE, alone_in, check_all, number_of, progress, warm_up_all
 from sitl.cli.search import place_of_search, search_campaign
 from sitl.generators.made_ground import NoWayError
@@ -127,7 +127,7 @@ def drive_campaign(
 
     When it is stopped, what is done is put out; then StoppedError.
     """
-    if fault := statistics_fault("campaign"):
+    if fault := statistics_fault("campaign") or (parquet_fault() if parquet else ""):
         raise CampaignError(fault)
     console = Console()
     table, folder = load_campaign(file), file.resolve().parent

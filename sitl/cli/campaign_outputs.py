@@ -24,7 +24,7 @@ PAIRS = ("axis", "world", "values", "pairs", "ratio of times")
 def put_out(
     console: Console, table: CampaignTable, runs: Runs, source: Path, folder: Path, *, parquet: bool = False
 ) -> None:
-    """All of it. ``source``: the campaign's file; ``folder``: of the results. Raises OutputError, CampaignError."""
+    """All of it. ``source``: the campaign's file; ``folder``: of the results. Raises OutputError."""
     axes = varied(table)
     lines = [
         [*line[: len(axes)], *(line[len(axes) + HEAD.index(name)] for name in NARROW)]

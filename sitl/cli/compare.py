@@ -16,6 +16,7 @@ from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.pictures import times
 from sitl.cli.campaign import BAD_INPUT, drive_campaign
 from sitl.cli.named import names_in
+from sitl.cli.runs import alone_in
 from sitl.experiments import drawing
 
 FILE, PLOT = "campaign.toml", "times.png"
@@ -42,7 +43,7 @@ def compare(
         file = out / FILE
         writable(file)
         _check(missions, planners, controllers)
-        with written(file), TemporaryDirectory(dir=out) as folder:
+        with alone_in(out), written(file), TemporaryDirectory(dir=out) as folder:
             tried = Path(folder) / FILE
             tried.write_text(_campaign(missions, tried.parent, planners, controllers, seeds), encoding="utf-8")
             _load(tried)

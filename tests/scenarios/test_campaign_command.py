@@ -16,6 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 from sitl.cli.commands import app
+from sitl.cli.runs import alone_in
 from tests.sitl.network.test_server import free_port
 from tests.support.rig import yard
 from tests.support.served import finished, mission_path, process, wait_until
@@ -154,6 +155,20 @@ def test_planners_side_by_side_are_a_campaign_with_a_plot(campaign: Path, monkey
     assert Path("out/compare/campaign.toml").read_text(encoding="utf-8") == kept, "the old report's commands still work"
 
 
+def test_two_comparisons_in_one_folder_are_one_line_and_change_nothing(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second had written its campaign over that of the first, whose report then named runs that were not in it."""
+    monkeypatch.chdir(campaign.parent)
+    kept = Path("out/compare/campaign.toml")
+    kept.parent.mkdir(parents=True)
+    kept.write_text("of the first")
+    with alone_in(kept.parent):
+        second = CliRunner().invoke(app, ["compare", "yard.toml", "--planners", "astar", "--seeds", "1"])
+    assert second.exit_code == 2 and "another campaign writes its runs here" in second.output, second.output
+    assert len(second.output.splitlines()) == 1 and kept.read_text() == "of the first"
+
+
 GLASS = 'size_m = [20.0, 10.0]\n[[obstacle]]\nline_m = [[0.0, 8.0], [10.0, 8.0]]\nwidth_m = 0.3\nmaterial = "glass"\n'
 BEHIND = '[[target]]\nnorth_m = 0.0\neast_m = 12.0\n[sitl]\nworld = "glass.toml"\nstart = [5, 5]\nheading_deg = 90.0\n'
 
@@ -193,6 +208,15 @@ def test_a_search_without_the_optimiser_is_one_line(campaign: Path, monkeypatch:
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 2
     assert result.output.splitlines()[-1] == "--search: cma is not installed; install rover-companion[search]"
+
+
+def test_a_table_that_cannot_be_written_is_told_before_hours_of_driving(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    result = CliRunner().invoke(app, ["campaign", str(campaign), "--parquet", "--out", str(campaign.parent / "out")])
+    assert result.exit_code == 2 and not list(campaign.parent.rglob("runs.jsonl")), result.output
+    assert result.output.startswith("--parquet: pyarrow is not installed; install rover-companion[parquet]")
 
 
 @pytest.mark.parametrize("command", ["campaign", "compare", "experiment gates"])
