@@ -15,9 +15,8 @@ from pathlib import Path
 
 from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignTable
-from sitl.campaign.page_parts import document, picture, table
+from sitl.campaign.page_parts import document, long_columns, picture, table
 from sitl.campaign.run_spec import RunSpec
-from sitl.campaign.runs_table import WIDE_LETTERS
 from sitl.campaign.summary import labels, varied
 from sitl.campaign.tables import records_of, write_records
 from sitl.search.best_values import best_values
@@ -135,7 +134,7 @@ def _finds(result: SearchResult) -> list[str]:
         )
         for kept in result.kept
     ]  # fmt: skip
-    wide = {1, 7} if any(len(line[1]) > WIDE_LETTERS for line in lines) else {7}
+    wide = {*long_columns(lines, [1]), 7}
     whole = table(FIND_HEAD, lines, text={0, 1, 3}, wide=wide, code={8}) if lines else "<p>None is made small yet.</p>"
     more = f" {result.left_out} more kinds were left out." if result.left_out else ""
     return [
@@ -161,12 +160,13 @@ def _every_find(result: SearchResult) -> list[str]:
         )
         for run_id, finds in list(wrong.items())[:MOST_FINDS]
     ]  # fmt: skip
+    wide = {*long_columns(lines, [1]), 7}
     first = f"The first {MOST_FINDS} of {len(wrong)} runs; evaluations.csv has the <i>id</i> of each. "
     return [
         f"<h2>Every find</h2><p>{first if len(wrong) > MOST_FINDS else ''}As they were found, before any was made "
         "small, and what was found while others were made small. The commands are to be given in the folder from which "
         "the search was driven.</p>",
-        f'<div class="long">{table(FIND_HEAD, lines, text={0, 1, 3}, wide={7}, code={8})}</div>',
+        f'<div class="long">{table(FIND_HEAD, lines, text={0, 1, 3}, wide=wide, code={8})}</div>',
     ]
 
 
@@ -186,7 +186,7 @@ def _starts(campaign: CampaignTable, result: SearchResult) -> list[str]:
                 f"{len(runs)}", f"{min(near):.3f}" if near else "-", " ".join(shows) or "-",
             )
         )  # fmt: skip
-    long = [number for number in range(len(axes)) if any(len(line[number]) > WIDE_LETTERS for line in lines)]
+    long = long_columns(lines, range(len(axes)))
     more = f"The first {MOST_STARTS} of {len(lines)} starts. " if len(lines) > MOST_STARTS else ""
     head = (*axes, "start", "seed", "generations", "runs", "nearest", "found")
     return [
