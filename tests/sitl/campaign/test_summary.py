@@ -92,7 +92,7 @@ def test_names_are_whole_on_a_narrow_terminal(tmp_path: Path, capsys: pytest.Cap
     runs = [(spec, replace(RESULT, reached=0)) for spec in specs_of(table)]
     put_out(Console(width=80), table, runs, Path("c.toml"), tmp_path)
     said = capsys.readouterr().out
-    assert "clutter, theta-star, motion-ga," in said and "guard yes" in said and "\N{HORIZONTAL ELLIPSIS}" not in said
+    assert "clutter, theta-star, points," in said and "guard yes " in said and "\N{HORIZONTAL ELLIPSIS}" not in said
 
 
 FAULTS = ["none", "link_outage start_s=1 duration_s=2; gps_noise start_s=60 metres=0.2"]
