@@ -38,6 +38,11 @@ code { font-size: .85em; background: var(--soft); padding: .1rem .3rem; user-sel
 """
 
 
+def number_of(count: int, what: str) -> str:
+    """The number with its word, like ``1 run`` or ``2 runs``."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
 def long_columns(lines: Iterable[Sequence[str]], among: Iterable[int]) -> set[int]:
     """The numbers of the columns, of those given, that are to be wrapped."""
     found = list(among)

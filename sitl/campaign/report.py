@@ -8,7 +8,7 @@ from pathlib import Path
 from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignTable, run_count
 from sitl.campaign.heat_maps import MOST_PANELS, heat_maps
-from sitl.campaign.page_parts import document, long_columns, picture, table
+from sitl.campaign.page_parts import document, long_columns, number_of, picture, table
 from sitl.campaign.pictures import times
 from sitl.campaign.policies import Policy
 from sitl.campaign.runs_table import runs_table
@@ -71,5 +71,5 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
 def _policies(runs: Runs) -> str:
     """Which were broken, in how many runs."""
     counts = broken_counts(runs)
-    told = ", ".join(f"{policy} in {count} runs" for policy, count in counts) or "none"
+    told = ", ".join(f"{policy} in {number_of(count, 'run')}" for policy, count in counts) or "none"
     return f"<p><b>Policies broken: {html.escape(told)}.</b> They are checked in every run: {', '.join(Policy)}.</p>"

@@ -19,6 +19,7 @@ from companion.recording.recorder import Recorder
 from companion.safety.reasons import EndReason
 from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.drive_run import mission_of, prepared, settings_of
+from sitl.campaign.page_parts import number_of
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunSpec, specs_of
 from sitl.campaign.run_store import Digests, RunStore, kept_run
@@ -26,7 +27,7 @@ from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
 from sitl.cli.extras import parquet_fault, statistics_fault
-from sitl.cli.runs import FILE, alone_in, check_all, number_of, progress, warm_up_all
+from sitl.cli.runs import FILE, alone_in, check_all, progress, warm_up_all
 from sitl.cli.search import place_of_search, search_campaign
 from sitl.generators.made_ground import NoWayError
 from sitl.scenario import ScenarioError

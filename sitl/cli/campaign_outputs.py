@@ -10,10 +10,10 @@ from rich.console import Console
 
 from companion.cli.inputs import written
 from sitl.campaign.campaign_file import CampaignTable, run_count
+from sitl.campaign.page_parts import number_of
 from sitl.campaign.report import write_report
 from sitl.campaign.summary import HEAD, PAIR_HEAD, Runs, broken_counts, differences, rows, short_labels, varied
 from sitl.campaign.tables import write_csv, write_parquet
-from sitl.cli.runs import number_of
 from sitl.experiments.results_page import terminal_table, without_intervals
 
 REPORT, CSV, PARQUET = "report.html", "runs.csv", "runs.parquet"

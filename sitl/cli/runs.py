@@ -27,11 +27,6 @@ QUIET_S = 120.0
 QUIET = f"no run has ended for {QUIET_S:.0f} s: a long one, or a planner or controller that never answers"
 
 
-def number_of(count: int, what: str) -> str:
-    """The number with its word, like ``1 run`` or ``2 runs``."""
-    return f"{count} {what}{'' if count == 1 else 's'}"
-
-
 def check_all(left: list[RunSpec], folder: Path) -> None:
     """What could not be driven at all is told before hours of driving. Raises one of ``BAD_INPUT``."""
     for spec in {(spec.world, spec.sensors, spec.faults): spec for spec in left}.values():

@@ -14,10 +14,11 @@ from rich.console import Console
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import writable, written
 from sitl.campaign.campaign_file import CampaignError, CampaignTable, load_campaign
+from sitl.campaign.page_parts import number_of
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.workers import driven_here
-from sitl.cli.runs import FILE, alone_in, check_all, number_of, progress, warm_up_all
+from sitl.cli.runs import FILE, alone_in, check_all, progress, warm_up_all
 from sitl.search.found_file import counted_from, differences, write_find
 from sitl.search.genes import genes_of
 from sitl.search.goals import Goal

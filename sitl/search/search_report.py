@@ -15,7 +15,7 @@ from pathlib import Path
 
 from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignTable
-from sitl.campaign.page_parts import document, long_columns, picture, table
+from sitl.campaign.page_parts import document, long_columns, number_of, picture, table
 from sitl.campaign.run_spec import RunSpec
 from sitl.campaign.summary import labels, varied
 from sitl.campaign.tables import records_of, write_records
@@ -106,8 +106,9 @@ def page(campaign: CampaignTable, result: SearchResult) -> str:
     still = "" if result.ended else " <b>The search was stopped; the same command goes on.</b>"
     parts = [
         f"<h1>{html.escape(campaign.name)}: search for {result.goal}</h1>",
-        f"<p>{result.evaluations} of {result.budget} runs in {len(result.generations)} generations of {starts} starts, "
-        f"and {result.tries} runs that made finds small.{still}</p>",
+        f"<p>{result.evaluations} of {number_of(result.budget, 'run')} in "
+        f"{number_of(len(result.generations), 'generation')} of {number_of(starts, 'start')}, "
+        f"and {number_of(result.tries, 'run')} that made finds small.{still}</p>",
         "<h2>What was found</h2>",
         *_finds(result),
         "<h2>How near it came</h2>",

@@ -54,6 +54,8 @@ def test_the_nearest_so_far_begins_again_with_each_start_and_finds_stand_apart()
     assert list(second.get_xdata()) == [6, 7, 8] and list(second.get_ydata()) == [0.6, 0.2, 0.2]
     crosses = np.asarray(panel.collections[1].get_offsets())
     assert crosses[:, 0].tolist() == [5.0]
+    (panel,) = best_values(Goal.COLLISION, GENERATIONS[:1]).axes
+    assert all(tick == round(tick) for tick in panel.get_xticks()), "runs are whole"
 
 
 def test_each_start_has_a_row_with_what_it_came_to() -> None:
@@ -77,4 +79,5 @@ def test_every_find_has_its_command_also_one_that_is_not_made_small(monkeypatch:
     monkeypatch.setattr(search_report, "MOST_FINDS", 1)
     text = page(CAMPAIGN, result)
     assert "The first 1 of 2 runs" in text and besides.spec.id not in text
-    assert "Every find" not in page(CAMPAIGN, replace(RESULT, generations=GENERATIONS[2:]))
+    text = page(CAMPAIGN, replace(RESULT, generations=GENERATIONS[2:], tries=1))
+    assert "Every find" not in text and "in 1 generation of 2 starts, and 1 run that made" in text
