@@ -15,6 +15,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from sitl.campaign.campaign_file import load_campaign
+from sitl.cli import compare
 from sitl.cli.commands import app
 from sitl.cli.runs import alone_in
 from tests.sitl.network.test_server import free_port
@@ -153,6 +155,16 @@ def test_planners_side_by_side_are_a_campaign_with_a_plot(campaign: Path, monkey
         bad = CliRunner().invoke(app, ["compare", *arguments])
         assert bad.exit_code == 2 and bad.output.startswith(says) and len(bad.output.splitlines()) == 1
     assert Path("out/compare/campaign.toml").read_text(encoding="utf-8") == kept, "the old report's commands still work"
+
+
+def test_ground_in_words_is_compared_like_a_mission(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Words that end in ``.6`` were taken for the name of a file."""
+    monkeypatch.chdir(campaign.parent)
+    driven: list[Path] = []
+    monkeypatch.setattr(compare, "drive_campaign", lambda file, out, jobs: driven.append(file) or [])
+    words = "rooms movers=2 least_door_m=1.6"
+    result = CliRunner().invoke(app, ["compare", words, "yard.toml", "--planners", "astar", "--seeds", "1"])
+    assert result.exit_code == 0 and load_campaign(driven[0]).worlds == [words, "../../yard.toml"], result.output
 
 
 def test_two_comparisons_in_one_folder_are_one_line_and_change_nothing(
