@@ -27,7 +27,7 @@ from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
 from sitl.cli.extras import parquet_fault, statistics_fault
-from sitl.cli.runs import FILE, alone_in, check_all, progress, warm_up_all
+from sitl.cli.runs import FILE, alone_in, check_all, progress, say_what_there_is, warm_up_all
 from sitl.cli.search import place_of_search, search_campaign
 from sitl.generators.made_ground import NoWayError
 from sitl.scenario import ScenarioError
@@ -138,7 +138,8 @@ def drive_campaign(
         digests = Digests(folder)
         store = RunStore(place / FILE, digests.of)
         specs = list(specs_of(table))
-        _say_what_there_is(store, specs)
+        done = len(store.of(specs))
+        say_what_there_is(store, f"{done} of {len(specs)} runs" if done else "")
         left = [spec for spec in specs if spec.id not in store.results]
         stopped: StoppedError | None = None
         if left:
@@ -158,15 +159,6 @@ def drive_campaign(
         typer.echo(f"{table.name}: {ended}; {place / REPORT} says which", err=True)
         raise typer.Exit(EXIT_FAILED)
     return runs
-
-
-def _say_what_there_is(store: RunStore, specs: list[RunSpec]) -> None:
-    done = len(store.of(specs))
-    parts = [f"{done} of {len(specs)} runs are there"] if done else []
-    parts += [f"{number_of(store.torn, 'torn line')} left out"] if store.torn else []
-    parts += [f"{number_of(store.older, 'line')} of other code or files left out"] if store.older else []
-    if parts:
-        typer.echo(f"{store.file}: {', '.join(parts)}", err=True)
 
 
 def _drive(

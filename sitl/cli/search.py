@@ -18,7 +18,7 @@ from sitl.campaign.page_parts import number_of
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.workers import driven_here
-from sitl.cli.runs import FILE, alone_in, check_all, progress, warm_up_all
+from sitl.cli.runs import FILE, alone_in, check_all, progress, say_what_there_is, warm_up_all
 from sitl.search.found_file import counted_from, differences, write_find
 from sitl.search.genes import genes_of
 from sitl.search.goals import Goal
@@ -120,6 +120,7 @@ def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs:
     with alone_in(place):
         digests = Digests(folder)
         store = RunStore(place / FILE, digests.of)
+        say_what_there_is(store, number_of(len(store.results), "run") if store.results else "")
         bases = first_bases(table)
         _check_moves(file, table, bases)
         check_all(bases, folder)

@@ -61,7 +61,9 @@ def test_each_kind_of_find_is_made_small_and_written_once(
     assert "collision: cylinders, seed 0: nothing" in said.err, "as far as it is"
 
 
-def test_a_stop_after_the_first_find_leaves_it_written(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stop_after_the_first_find_leaves_it_written(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """They were written at the very end."""
     monkeypatch.setattr(search, "driven_here", Drives(14))
     with pytest.raises(StoppedError, match="13 runs, kept in"):
@@ -69,6 +71,12 @@ def test_a_stop_after_the_first_find_leaves_it_written(campaign: Path, monkeypat
     assert found(campaign) == ["collision", "refused"]
     report = (campaign.parent / "out" / "search-collision" / "report.html").read_text()
     assert "The search was stopped" in report and report.count(".toml --replay ") == 2
+    kept = campaign.parent / "out" / "search-collision" / "runs.jsonl"
+    with kept.open("a") as file:
+        file.write("{torn")
+    capsys.readouterr()
+    search.search_campaign(campaign, Goal.COLLISION, 40, campaign.parent / "out", 1)
+    assert f"{kept}: 13 runs are there, 1 torn line left out" in capsys.readouterr().err
 
 
 def test_every_find_can_be_driven_again_from_what_the_search_has_kept(
