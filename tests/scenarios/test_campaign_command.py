@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import platform
 import signal
 import socket
 import subprocess
@@ -12,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -21,7 +23,7 @@ from sitl.cli.commands import app
 from sitl.cli.runs import alone_in
 from tests.sitl.network.test_server import free_port
 from tests.support.rig import yard
-from tests.support.served import finished, mission_path, process, wait_until
+from tests.support.served import finished, interpreter, mission_path, process, wait_until
 
 CAMPAIGN = """
 worlds = ["yard.toml"]
@@ -85,6 +87,27 @@ def test_on_a_cluster_whose_worker_is_killed_the_figures_are_those_of_this_machi
     assert len(lines_of(there)) == 8 and len(results(there)) == 8, "nothing lost, nothing twice"
     assert results(here).items() <= results(there).items() and len(results(here)) >= 3
     assert "off_model" in out and (there / "report.html").stat().st_size > 10_000
+
+
+@pytest.mark.thorough
+@pytest.mark.slow
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names of its units are those of x86-64")
+def test_a_processor_without_wide_units_gives_the_same_figures(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As another machine might be: no vector units beyond the least, and no fused multiply-add. It compiles anew."""
+    campaign.write_text(CAMPAIGN.replace("runs = 4", "runs = 1"))
+    here, there = campaign.parent / "here", campaign.parent / "there"
+    assert CliRunner().invoke(app, ["campaign", str(campaign), "--out", str(here)]).exit_code == 0
+    for name, value in {
+        "NUMBA_CPU_NAME": "generic",
+        "NUMBA_CPU_FEATURES": "",
+        "NUMBA_CACHE_DIR": str(campaign.parent / "kernels"),
+        "NPY_DISABLE_CPU_FEATURES": " ".join(np.show_config(mode="dicts")["SIMD Extensions"]["found"]),
+    }.items():
+        monkeypatch.setenv(name, value)
+    with interpreter("sitl", "campaign", campaign, "--out", there) as run:
+        _, err = run.communicate(timeout=560)
+    assert run.returncode == 0, err
+    assert results(there) == results(here) and len(results(here)) == 2
 
 
 @pytest.mark.thorough
