@@ -168,7 +168,14 @@ def _check_once(path: Path, folder: Path, table: CampaignTable) -> None:
 
 
 def _check_search(path: Path, search: SearchTable) -> None:
-    """Its settings are numbers that there are, and their bounds ascend and may be set. Raises CampaignError."""
+    """Its parts stand there once; its settings are moved, are numbers, and may have their bounds, which ascend.
+
+    Raises CampaignError.
+    """
+    if len(set(search.parts)) < len(search.parts):
+        raise CampaignError(f"{path}: search.parts: one stands there twice; name each once")
+    if search.settings and SearchPart.SETTINGS not in search.parts:
+        raise CampaignError(f'{path}: search.settings: moved only where "settings" stands in search.parts')
     for name, (low, high) in search.settings.items():
         section, _, key = name.partition(".")
         usual = getattr(getattr(Settings(), section, None), key or "-", None)

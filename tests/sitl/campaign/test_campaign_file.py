@@ -63,6 +63,11 @@ def test_each_combination_is_one_run_for_each_seed_and_seeds_come_one_after_the_
             'worlds = ["yard"]\n[search]\nsettings = { "guidance.look_ahead_m" = [1.0, inf] }',
             "search.settings: guidance.look_ahead_m: input should be a finite number (got inf)",
         ),
+        ('worlds = ["yard"]\n[search]\nparts = ["rover", "rover"]', "search.parts: one stands there twice"),
+        (
+            'worlds = ["yard"]\n[search]\nparts = ["rover"]\nsettings = { "guidance.look_ahead_m" = [1.0, 2.0] }',
+            'search.settings: moved only where "settings" stands in search.parts',
+        ),
         (
             'worlds = ["yard"]\n[search]\nsettings = { "navigator.doubts" = [1, inf] }',
             "search.settings: navigator.doubts: input should be a",
