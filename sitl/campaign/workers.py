@@ -66,6 +66,9 @@ def driven_on(specs: Sequence[RunSpec], digests: Digests, address: str) -> Done:
         client = Client(address, timeout="5s")
     except (OSError, ValueError) as error:
         raise CampaignError(f"--cluster {address}: nobody answers there; start one: dask scheduler") from error
+    except TypeError as error:  # tls:// without keys in dask's settings
+        text = shorten(str(error), MOST_WORDS, placeholder=" ...")
+        raise CampaignError(f"--cluster {address}: {text}; write tcp://HOST:PORT, or set dask up for it") from error
     return _told(_driven_by(client, specs, digests), f"--cluster {address}")
 
 

@@ -150,6 +150,7 @@ def test_what_is_done_is_not_done_again_and_a_run_can_be_driven_again(
         (["short.toml", "--replay", "abc", "--record", "r"], "no run of this campaign"),
         (["short.toml", "--out", "/proc/none"], "cannot be written"),
         (["short.toml", "--cluster", "tcp://127.0.0.1:1"], "nobody answers there"),
+        (["short.toml", "--cluster", "tls://127.0.0.1:1"], "write tcp://HOST:PORT"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(
