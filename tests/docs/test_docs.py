@@ -31,7 +31,6 @@ from sitl.campaign.campaign_file import load_campaign, run_count
 from sitl.campaign.run_spec import specs_of
 from sitl.faults.fault_file import load_faults
 from sitl.faults.tables import KINDS
-from sitl.generators.kinds import GroundKind, parameters_of
 from sitl.search.genes import FAULTS
 from sitl.sensors.suites import suite_of
 from sitl.world.world_file import DoorTable, ObstacleTable, RoughTable, SlipperyTable, WorldTable, load_world
@@ -330,20 +329,6 @@ def test_the_run_that_the_page_on_campaigns_drives_again_exists() -> None:
     text = (ROOT / "docs" / "campaigns.md").read_text("utf-8")
     ((file, run_id),) = re.findall(r"rover-sitl campaign (\S+) --replay (\w+)", text)
     assert run_id in {spec.id for spec in specs_of(load_campaign(ROOT / file))}
-
-
-def test_the_parameters_of_generated_ground_are_those_of_the_page() -> None:
-    text = (ROOT / "docs" / "worlds.md").read_text("utf-8")
-    found = re.findall(r"^\| `(\w+)` \| `(\w+)` \| ([\d.]+) \| ([\d.]+) to ([\d.]+) \| (.*?) \|$", text, re.M)
-    told = {(kind, name, *map(float, figures), meaning) for kind, name, *figures, meaning in found}
-    known = set()
-    for kind in GroundKind:
-        for name, one in parameters_of(kind).model_fields.items():
-            (low,), (high,) = (
-                [getattr(bound, end) for bound in one.metadata if hasattr(bound, end)] for end in ("ge", "le")
-            )
-            known.add((kind.value, name, float(one.default), float(low), float(high), one.description))
-    assert told == known
 
 
 def test_the_faults_that_a_search_moves_are_those_of_the_page() -> None:
