@@ -5,13 +5,15 @@ Nouns: campaign.
 
 from __future__ import annotations
 
+import math
 import re
 from copy import deepcopy
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from companion.core.own_parts import OwnPartError
 from companion.executive.controller_choice import check_controller
@@ -29,6 +31,8 @@ SHIPPED = "shipped"
 Share = Annotated[float, Field(ge=0.0, le=0.9)]
 Seconds = Annotated[float, Field(ge=0.0, le=2.0)]
 MOST_RUNS = 1_000_000
+GREATEST_SEED = 2**53
+"""Every program that reads a table has whole numbers as large as this."""
 
 
 class CampaignError(Exception):
@@ -68,7 +72,7 @@ class CampaignTable(BaseModel):
 
     name: str = Field(default="", max_length=100, pattern=r"^[\w .,+()-]*$")
     worlds: list[str] = Field(min_length=1)
-    seed: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, le=GREATEST_SEED)
     runs: int = Field(default=30, ge=1)
     planners: list[str] = Field(default=["hybrid"], min_length=1)
     controllers: list[ControllerKind] = Field(default=["points"], min_length=1)
@@ -102,7 +106,16 @@ def load_campaign(path: Path) -> CampaignTable:
             SensorSpec.of(sensors).check(folder)
         except ValueError as error:
             raise CampaignError(f"{path}: sensors {number}: {error}") from error
-    return table.model_copy(update={"name": table.name or re.sub(r"[^\w .,+()-]", "-", path.stem)})
+    _check_once(path, folder, table)
+    return table.model_copy(update={"name": _name_of(path, table)})
+
+
+def _name_of(path: Path, table: CampaignTable) -> str:
+    """That of the folder of results, too. Raises CampaignError."""
+    name = table.name or re.sub(r"[^\w .,+()-]", "-", path.stem)
+    if not re.search(r"\w", name):
+        raise CampaignError(f"{path}: name: {name!r} names no folder; give it letters or digits")
+    return name
 
 
 def run_count(table: CampaignTable) -> int:
@@ -139,14 +152,30 @@ def _check_names(path: Path, table: CampaignTable) -> None:
                     f"{path}: settings.{name}: {section}.{key}: stands in the list {axis}; name it there"
                 )
     _check_search(path, table.search)
-    for axis in ("worlds", "planners", "controllers", "sensors", "faults", "guard", "off_model", "late_s"):
-        values_of = getattr(table, axis)
-        if len(set(values_of)) < len(values_of):
+
+
+def _check_once(path: Path, folder: Path, table: CampaignTable) -> None:
+    """No list has the same twice, in other words either: it would count twice. Raises CampaignError."""
+    meanings: dict[str, list[Any]] = {
+        "worlds": [GroundSpec.of(world) or (folder / world).resolve() for world in table.worlds],
+        "sensors": [SensorSpec.of(sensors) for sensors in table.sensors],
+        "faults": [plan if plan == NOTHING else replace(faults_of(plan, folder), source="") for plan in table.faults],
+        **{axis: getattr(table, axis) for axis in ("planners", "controllers", "guard", "off_model", "late_s")},
+    }
+    for axis, values in meanings.items():
+        if any(value in values[:number] for number, value in enumerate(values)):
             raise CampaignError(f"{path}: {axis}: a value stands there twice; each combination is driven once")
 
 
 def _check_search(path: Path, search: SearchTable) -> None:
-    """Its settings are numbers that there are, and their bounds ascend. Raises CampaignError."""
+    """Its parts stand there once; its settings are moved, are numbers, and may have their bounds, which ascend.
+
+    Raises CampaignError.
+    """
+    if len(set(search.parts)) < len(search.parts):
+        raise CampaignError(f"{path}: search.parts: one stands there twice; name each once")
+    if search.settings and SearchPart.SETTINGS not in search.parts:
+        raise CampaignError(f'{path}: search.settings: moved only where "settings" stands in search.parts')
     for name, (low, high) in search.settings.items():
         section, _, key = name.partition(".")
         usual = getattr(getattr(Settings(), section, None), key or "-", None)
@@ -154,6 +183,20 @@ def _check_search(path: Path, search: SearchTable) -> None:
             raise CampaignError(f"{path}: search.settings: {name!r:.60} is no number of docs/settings.md")
         if not low < high:
             raise CampaignError(f"{path}: search.settings: {name}: {low:g} is not less than {high:g}")
+        for bound in (low, high):
+            whole = isinstance(usual, int) and math.isfinite(bound)
+            if fault := _fault_of_setting(section, key, int(bound) if whole else bound):
+                raise CampaignError(f"{path}: search.settings: {name}: {fault}; docs/settings.md has its bounds")
+
+
+def _fault_of_setting(section: str, key: str, value: float) -> str:
+    """What is wrong with a value by itself; empty if nothing is. What it says with others a search finds out."""
+    try:
+        Settings.model_validate({section: {key: value}})
+    except ValidationError as error:
+        told = [one["msg"] for one in error.errors() if one["loc"] == (section, key)]
+        return f"{told[0].lower()} (got {value:g})" if told else ""
+    return ""
 
 
 def _check_world(path: Path, folder: Path, world: str) -> None:

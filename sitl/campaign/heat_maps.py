@@ -18,7 +18,7 @@ from matplotlib.image import AxesImage
 from companion.mission.load import load_mission
 from sitl.campaign.campaign_file import CampaignTable
 from sitl.campaign.drive_run import NO_GROUND
-from sitl.campaign.pictures import PANEL_IN, TITLE_LETTER_IN, combination_of, combinations, wrapped
+from sitl.campaign.pictures import LINE_IN, PANEL_IN, TITLE_LETTER_IN, combination_of, combinations, wrapped
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult
 from sitl.campaign.summary import Runs, labels
@@ -103,12 +103,17 @@ def _heat_map(stage: _Stage, title: str, results: Mapping[str, Sequence[RunResul
     longest_s = max((seconds for one in spent.values() for seconds in one.values()), default=1.0)
     columns = math.ceil(math.sqrt(len(spent)))
     lines, width = -(-len(spent) // columns), 8.0 if len(spent) == 1 else PANEL_IN
-    tall = width * 0.9 * min(1.2, (north_m[1] - north_m[0]) / (east_m[1] - east_m[0])) + 0.9
+    first = title if len(spent) == 1 else ""  # what stands below the picture says of all where they are
+    titles = [
+        wrapped(": ".join(filter(None, (first, name, _told(results[name])))), width, TITLE_LETTER_IN) for name in spent
+    ]
+    highest = max(text.count("\n") + 1 for text in titles)
+    tall = width * 0.9 * min(1.2, (north_m[1] - north_m[0]) / (east_m[1] - east_m[0])) + 0.7 + LINE_IN * highest
     figure = Figure(figsize=(width * columns + 0.8, tall * lines + 0.3), layout="constrained")
     panels = figure.subplots(lines, columns, squeeze=False).ravel()
-    for panel, (name, squares) in zip(panels, spent.items(), strict=False):
+    for panel, text, squares in zip(panels, titles, spent.values(), strict=False):
         image = _draw(panel, stage, squares, (north_m, east_m), longest_s)
-        drawing.title(panel, wrapped(f"{title}, {name}: {_told(results[name])}", width, TITLE_LETTER_IN))
+        drawing.title(panel, text)
     for panel in panels[len(spent) :]:
         panel.set_visible(False)
     figure.colorbar(image, ax=panels.tolist(), label="seconds in a square metre", shrink=0.8, panchor=False)

@@ -9,6 +9,8 @@ from collections.abc import Container, Iterable, Sequence
 
 from matplotlib.figure import Figure
 
+WIDE_LETTERS = 30
+"""Longer words of a column are wrapped."""
 STYLE = """
 :root { color-scheme: light dark; --line: #8886; --soft: #8882; }
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 75rem; margin: 2rem auto; padding: 0 1rem; }
@@ -25,7 +27,7 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 th { background: var(--soft); vertical-align: bottom; } th.text, td.text { text-align: left; }
-td.wide { white-space: normal; min-width: 18rem; text-align: left; }
+td.wide { white-space: normal; min-width: 14rem; text-align: left; }
 th[aria-sort] { cursor: pointer; } th[aria-sort=ascending]::after { content: " ▲"; }
 th[aria-sort=descending]::after { content: " ▼"; }
 .filter { display: flex; flex-wrap: wrap; gap: .3rem .9rem; align-items: baseline; }
@@ -34,6 +36,17 @@ figure { margin: 1rem 0; background: #fff; padding: .5rem; display: inline-block
 img { max-width: 100%; height: auto; } figcaption { color: #444; font-size: .9em; }
 code { font-size: .85em; background: var(--soft); padding: .1rem .3rem; user-select: all; }
 """
+
+
+def number_of(count: int, what: str) -> str:
+    """The number with its word, like ``1 run`` or ``2 runs``."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def long_columns(lines: Iterable[Sequence[str]], among: Iterable[int]) -> set[int]:
+    """The numbers of the columns, of those given, that are to be wrapped."""
+    found = list(among)
+    return {number for line in lines for number in found if len(line[number]) > WIDE_LETTERS}
 
 
 def table(

@@ -8,7 +8,7 @@ from pathlib import Path
 from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignTable, run_count
 from sitl.campaign.heat_maps import MOST_PANELS, heat_maps
-from sitl.campaign.page_parts import document, picture, table
+from sitl.campaign.page_parts import document, long_columns, number_of, picture, table
 from sitl.campaign.pictures import times
 from sitl.campaign.policies import Policy
 from sitl.campaign.runs_table import runs_table
@@ -25,7 +25,7 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
     """The whole page; it loads nothing."""
     axes = varied(campaign)
     pairs = [(one.axis, one.world, one.value, one.other, *one.cells) for one in differences(campaign, runs)]
-    count = run_count(campaign)
+    lines, count = rows(campaign, runs), run_count(campaign)
     still = f" <b>Not all runs are done: {count - len(runs)} are left.</b>" if len(runs) < count else ""
     parts = [
         f"<h1>{html.escape(campaign.name)}</h1>",
@@ -37,7 +37,7 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
         "<i>/bound</i>: their time over that of the shortest way at any angle on known ground at cruise speed; "
         "<i>by GA</i>: the share of searches that the genetic "
         "algorithm answered, and not the graph search behind it.</p>",
-        table((*axes, *HEAD), rows(campaign, runs), range(len(axes))),
+        table((*axes, *HEAD), lines, range(len(axes)), wide=long_columns(lines, range(len(axes)))),
     ]
     parts.append(_policies(runs))
     if pairs:
@@ -45,7 +45,9 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
             "<h2>Pairs</h2><p>Two runs that differ in one axis only: same world, same seed. Each value against the "
             "axis's first one; times where both are complete. <i>ratio</i>: the geometric mean of the pairs' ratios. "
             "95 % intervals by Student's t over seeds.</p>",
-            table(("axis", "world", "value", "against", *PAIR_HEAD), pairs, range(4)),
+            table(
+                ("axis", "world", "value", "against", *PAIR_HEAD), pairs, range(4), wide=long_columns(pairs, range(4))
+            ),
         ]
     if any(result.complete for _, result in runs):
         parts += [
@@ -69,5 +71,5 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
 def _policies(runs: Runs) -> str:
     """Which were broken, in how many runs."""
     counts = broken_counts(runs)
-    told = ", ".join(f"{policy} in {count} runs" for policy, count in counts) or "none"
+    told = ", ".join(f"{policy} in {number_of(count, 'run')}" for policy, count in counts) or "none"
     return f"<p><b>Policies broken: {html.escape(told)}.</b> They are checked in every run: {', '.join(Policy)}.</p>"

@@ -18,7 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from companion.core.own_parts import OwnKind, OwnPartError, looks_own, source_of
+from companion.core.own_parts import OwnKind, looks_own, source_of
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
@@ -32,6 +32,8 @@ from sitl.experiments.experiment import code_digest
 from sitl.generators.measures import Difficulty
 
 MOST_BYTES = 2_000_000_000
+UNREADABLE = (ValueError, KeyError, TypeError, AttributeError, RecursionError)
+"""What a line raises that was torn, or written by something else."""
 
 
 class RunStore:
@@ -46,7 +48,7 @@ class RunStore:
         self.older = 0
         """Lines of other code or other files."""
         self._digests = digests
-        for line in _lines(file):
+        for line in _lines(file, repair=True):
             self._take(line)
 
     def add(self, spec: RunSpec, result: RunResult) -> None:
@@ -67,18 +69,31 @@ class RunStore:
 
     def _take(self, line: str) -> None:
         try:
-            body: dict[str, Any] = json.loads(line)
-            check = body.pop("check")
-            if check != _check_of(body):
-                raise ValueError("check sum")
+            body = _body_of(line)
             spec, result = RunSpec(**body["run"]), _result(body["result"])
-        except (ValueError, KeyError, TypeError, AttributeError):
+            is_ours = body["digest"] == self._digests(spec)
+        except UNREADABLE:
             self.torn += 1
             return
-        if body["digest"] != self._digests(spec):
+        if not is_ours:
             self.older += 1
         elif result.outcome != ERROR:  # what failed on one machine for want of memory is driven again
             self.results.setdefault(spec.id, result)
+
+
+def kept_run(file: Path, run_id: str) -> RunSpec | None:
+    """The run of this name that a file has, whatever code has driven it; None: it has none.
+
+    Raises CampaignError when the file cannot be read.
+    """
+    for line in _lines(file):
+        try:
+            body = _body_of(line)
+            if body["id"] == run_id:
+                return RunSpec(**body["run"])
+        except UNREADABLE:
+            continue
+    return None
 
 
 class Digests:
@@ -90,7 +105,7 @@ class Digests:
         self._known: dict[tuple[str, ...], str] = {}
 
     def of(self, spec: RunSpec) -> str:
-        """That of a run; empty where one of its files cannot be read."""
+        """That of a run; empty where one of its files cannot be read, or where it says what this code does not know."""
         key = (spec.world, spec.planner, spec.controller, spec.sensors, spec.faults)
         if key not in self._known:
             digest = hashlib.sha256(code_digest().encode() + _libraries().encode())
@@ -98,7 +113,7 @@ class Digests:
                 for file in _files(spec, self.folder):
                     digest.update(file.name.encode() + read_at_most(file, MOST_BYTES))
                 self._known[key] = digest.hexdigest()[:16]
-            except (OSError, MissionError, MapError, OwnPartError):
+            except (OSError, MissionError, MapError, ValueError):
                 self._known[key] = ""
         return self._known[key]
 
@@ -119,16 +134,25 @@ def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
     yield from (source for source in sources if source is not None)
 
 
-def _lines(file: Path) -> list[str]:
+def _lines(file: Path, *, repair: bool = False) -> list[str]:
+    """``repair``: nobody else writes to it."""
     try:
         data = read_at_most(file, MOST_BYTES) if file.exists() else b""
-        if data and not data.endswith(b"\n"):
+        if repair and data and not data.endswith(b"\n"):
             # A line that was torn: the next one must not be appended to it.
             with file.open("ab") as out:
                 out.write(b"\n")
     except OSError as error:
         raise CampaignError(f"{file}: cannot be used: {error.strerror}; choose another folder with --out") from error
     return data.decode("utf-8", errors="replace").splitlines()
+
+
+def _body_of(line: str) -> dict[str, Any]:
+    """Raises one of ``UNREADABLE``."""
+    body: dict[str, Any] = json.loads(line)
+    if body.pop("check") != _check_of(body):
+        raise ValueError("check sum")
+    return body
 
 
 def _result(values: dict[str, Any]) -> RunResult:

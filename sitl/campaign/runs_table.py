@@ -7,15 +7,13 @@ import shlex
 from pathlib import Path
 
 from sitl.campaign.campaign_file import CampaignTable
-from sitl.campaign.page_parts import table
+from sitl.campaign.page_parts import long_columns, table
 from sitl.campaign.policies import broken
 from sitl.campaign.run_spec import AXES, RunResult, RunSpec
 from sitl.campaign.summary import Runs, labels, varied
 
 MOST_ROWS = 2000
 """With more rows browsers become slow."""
-WIDE_LETTERS = 30
-"""Longer words of an axis are wrapped."""
 SCRIPT = Path(__file__).with_suffix(".js")
 COLUMNS = (
     "seed", "broke", "outcome", "targets", "touched", "refused", "s", "/bound", "closest m", "last word",
@@ -34,7 +32,7 @@ def runs_table(campaign: CampaignTable, runs: Runs, source: Path) -> str:
         [*(words[axis][getattr(spec, axis)] for axis in axes), *_cells(spec, one, source)] for spec, one in ordered
     ]
     head = (*axes, *COLUMNS)
-    long = {number for number in range(len(axes)) if any(len(line[number]) > WIDE_LETTERS for line in lines)}
+    long = long_columns(lines, range(len(axes)))
     text = {*range(len(axes)), *(head.index(name) for name in ("broke", "outcome"))}
     columns = [*range(len(axes)), *(head.index(name) for name in CHOSEN)]
     whole = table(head, lines, text, wide={*long, head.index("last word")}, code={len(head) - 1})

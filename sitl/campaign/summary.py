@@ -21,9 +21,12 @@ from numpy.typing import NDArray
 from sitl.campaign.campaign_file import CampaignTable
 from sitl.campaign.policies import ERROR, Policy, broken
 from sitl.campaign.run_spec import AXES, RunResult, RunSpec
+from sitl.campaign.worded import BETWEEN_FAULTS
 from sitl.experiments.results_page import share_with_interval, without_intervals
 
 Runs = Sequence[tuple[RunSpec, RunResult]]
+WORDED = ("world", "sensors", "faults")
+"""Axes whose values may be a name and what differs."""
 FEWEST = 3
 """With fewer seeds no interval is told."""
 FILES = (".toml", ".plan", ".waypoints")
@@ -88,6 +91,16 @@ def labels(campaign: CampaignTable, axis: str) -> dict[object, str]:
     short = {value: shown(value) for value in values}
     twice = {text for text, count in Counter(short.values()).items() if count > 1}
     return {value: str(value) if text in twice else text for value, text in short.items()}
+
+
+def short_labels(campaign: CampaignTable, axis: str) -> dict[str, str]:
+    """For a terminal: of ``labels`` without what follows each name, where that still says which."""
+    whole = list(labels(campaign, axis).values())
+    names = {
+        text: "; ".join(piece.split()[0] for piece in text.split(BETWEEN_FAULTS) if piece.strip()) for text in whole
+    }
+    counts = Counter(names.values())
+    return {text: name if counts[name] == 1 and axis in WORDED else text for text, name in names.items()}
 
 
 def shown(value: object) -> str:

@@ -8,7 +8,6 @@ from dataclasses import asdict, fields
 from pathlib import Path
 
 from companion.storage.files import whole_file
-from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.policies import broken
 from sitl.campaign.summary import Runs
 from sitl.generators.measures import Difficulty
@@ -30,14 +29,10 @@ def write_records(file: Path, records: Sequence[Mapping[str, object]]) -> None:
 
 
 def write_parquet(file: Path, runs: Runs) -> None:
-    """The same for pandas, polars, DuckDB. Raises OSError, and CampaignError if pyarrow is not installed."""
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError as error:
-        raise CampaignError(
-            "--parquet: pyarrow is not installed; install rover-companion[parquet], or leave the option out"
-        ) from error
+    """The same for pandas, polars, DuckDB; needs pyarrow. Raises OSError."""
+    import pyarrow
+    from pyarrow import parquet
+
     with whole_file(file) as new:
         parquet.write_table(pyarrow.Table.from_pylist(records_of(runs)), new)
 

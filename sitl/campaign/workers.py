@@ -5,20 +5,27 @@ Nouns: worker.
 
 from __future__ import annotations
 
+import logging
 import socket
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.drive_run import drive
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests
+from sitl.campaign.worker_start import begin
 
 Done = Iterator[tuple[RunSpec, RunResult]]
 RETRIES = 3
 """So often a run is begun again that a worker could not begin. One whose worker has gone the scheduler itself gives to
 another worker."""
+WORKERS_S = 60.0
+"""For so long a campaign waits for the first worker of a cluster."""
+MOST_WORDS = 200
+"""Letters of an error that are told."""
 
 
 def driven_here(specs: Sequence[RunSpec], digests: Digests, jobs: int) -> Done:
@@ -44,8 +51,8 @@ def driven_here(specs: Sequence[RunSpec], digests: Digests, jobs: int) -> Done:
 def driven_on(specs: Sequence[RunSpec], digests: Digests, address: str) -> Done:
     """The same by the workers of a dask scheduler. Each needs this version of the code, and the campaign's folder.
 
-    Raises CampaignError when there is no scheduler, when a worker has other code or other files, and when workers keep
-    dying.
+    Raises CampaignError when there is no scheduler or no worker, when a worker has other code or other files, when
+    workers keep dying, and when the scheduler has gone.
     """
     try:
         from distributed import Client
@@ -53,10 +60,15 @@ def driven_on(specs: Sequence[RunSpec], digests: Digests, address: str) -> Done:
         raise CampaignError(
             f"--cluster {address}: dask is not installed; install rover-companion[cluster], or leave the option out"
         ) from error
+    for name in ("distributed", "distributed.client"):  # they print tracebacks of what is told in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout="5s")
     except (OSError, ValueError) as error:
         raise CampaignError(f"--cluster {address}: nobody answers there; start one: dask scheduler") from error
+    except TypeError as error:  # tls:// without keys in dask's settings
+        text = shorten(str(error), MOST_WORDS, placeholder=" ...")
+        raise CampaignError(f"--cluster {address}: {text}; write tcp://HOST:PORT, or set dask up for it") from error
     return _told(_driven_by(client, specs, digests), f"--cluster {address}")
 
 
@@ -64,6 +76,7 @@ def _driven_by(client: Any, specs: Sequence[RunSpec], digests: Digests) -> Done:
     from distributed import as_completed
 
     with client:
+        _begin(client)
         wanted = [digests.of(spec) for spec in specs]
         futures = client.map(
             _checked_on_a_worker, specs, wanted, folder=digests.folder, retries=RETRIES, pure=False, batch_size=50
@@ -73,6 +86,25 @@ def _driven_by(client: Any, specs: Sequence[RunSpec], digests: Digests) -> Done:
             future.release()
 
 
+def _begin(client: Any) -> None:
+    """Wait for a worker, and have each begin. Raises CampaignError."""
+    address = client.scheduler.address
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_S)
+    except TimeoutError as error:
+        raise CampaignError(
+            f"--cluster {address}: no worker has come within {WORKERS_S:g} s; "
+            f"start some: dask worker {address} --nthreads 1"
+        ) from error
+    try:
+        client.register_worker_callbacks(begin)  # also of workers that come later
+    except Exception as error:  # such as one without the program: that comes as no ImportError
+        text = shorten(f"{error}", MOST_WORDS, placeholder=" ...")
+        raise CampaignError(
+            f"--cluster {address}: a worker cannot begin: {text}; install the same version of the program there"
+        ) from error
+
+
 def _told(done: Done, what: str) -> Done:
     """The same; whatever ends the workers is told in one line."""
     try:
@@ -80,8 +112,8 @@ def _told(done: Done, what: str) -> Done:
     except CampaignError:
         raise
     except Exception as error:
-        text = " ".join(f"{type(error).__name__}: {error}".split())
-        raise CampaignError(f"{what}: {text:.200}; what is done is kept, and the same command goes on") from error
+        text = shorten(f"{type(error).__name__}: {error}", MOST_WORDS, placeholder=" ...")
+        raise CampaignError(f"{what}: {text}; what is done is kept, and the same command goes on") from error
 
 
 def _checked(spec: RunSpec, digest: str, folder: Path) -> tuple[RunSpec, RunResult]:

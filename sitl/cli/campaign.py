@@ -19,15 +19,16 @@ from companion.recording.recorder import Recorder
 from companion.safety.reasons import EndReason
 from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.drive_run import mission_of, prepared, settings_of
+from sitl.campaign.page_parts import number_of
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunSpec, specs_of
-from sitl.campaign.run_store import Digests, RunStore
+from sitl.campaign.run_store import Digests, RunStore, kept_run
 from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
-from sitl.cli.extras import statistics_fault
-from sitl.cli.runs import FILE, alone_in, check_all, number_of, progress, warm_up_all
-from sitl.cli.search import search_campaign
+from sitl.cli.extras import parquet_fault, statistics_fault
+from sitl.cli.runs import FILE, alone_in, check_all, progress, say_what_there_is, warm_up_all
+from sitl.cli.search import place_of_search, search_campaign
 from sitl.generators.made_ground import NoWayError
 from sitl.scenario import ScenarioError
 from sitl.search.goals import Goal
@@ -36,8 +37,8 @@ BAD_INPUT = (CampaignError, MissionError, MapError, ScenarioError, OutputError, 
 EXIT_FAILED = 3
 BUDGET = 1000
 APART = {
-    "--search": ("--cluster", "--parquet", "--replay", "--record"),
-    "--replay": ("--cluster", "--parquet", "--jobs", "--out"),
+    "--search": ("--cluster", "--parquet"),
+    "--replay": ("--cluster", "--parquet", "--jobs", "--budget"),
     "--cluster": ("--jobs",),
 }
 """Options that do not go together."""
@@ -55,7 +56,11 @@ def campaign(
         typer.Option(metavar="tcp://HOST:PORT", help="A dask scheduler whose workers drive (needs the extra cluster)."),
     ] = None,
     replay: Annotated[
-        str | None, typer.Option(metavar="ID", help="Drive this single run again, with a record; ID as in the report.")
+        str | None,
+        typer.Option(
+            metavar="ID",
+            help="Drive this single run again, with a record; ID as in the report. With --search: of the search.",
+        ),
     ] = None,
     record: Annotated[Path | None, typer.Option(help="With --replay: the folder of the record.")] = None,
     search: Annotated[
@@ -94,7 +99,7 @@ def campaign(
             }
         )
         if replay is not None or record is not None:
-            _drive_again(file, replay, record)
+            _drive_again(file, replay, record, search, out)
         elif search is not None:
             search_campaign(file, search, budget or BUDGET, out, jobs)
         else:
@@ -108,6 +113,8 @@ def _check_together(given: Mapping[str, bool]) -> None:
     """Raises CampaignError for options of which one would be without effect."""
     if given["--budget"] and not given["--search"]:
         raise CampaignError("--budget goes with --search")
+    if given["--replay"] and given["--out"] and not given["--search"]:
+        raise CampaignError("--replay and --out go together with --search alone; leave --out out")
     for one, others in APART.items():
         for other in others:
             if given[one] and given[other]:
@@ -121,7 +128,7 @@ def drive_campaign(
 
     When it is stopped, what is done is put out; then StoppedError.
     """
-    if fault := statistics_fault("campaign"):
+    if fault := statistics_fault("campaign") or (parquet_fault() if parquet else ""):
         raise CampaignError(fault)
     console = Console()
     table, folder = load_campaign(file), file.resolve().parent
@@ -131,7 +138,8 @@ def drive_campaign(
         digests = Digests(folder)
         store = RunStore(place / FILE, digests.of)
         specs = list(specs_of(table))
-        _say_what_there_is(store, specs)
+        done = len(store.of(specs))
+        say_what_there_is(store, f"{done} of {len(specs)} runs" if done else "")
         left = [spec for spec in specs if spec.id not in store.results]
         stopped: StoppedError | None = None
         if left:
@@ -151,15 +159,6 @@ def drive_campaign(
         typer.echo(f"{table.name}: {ended}; {place / REPORT} says which", err=True)
         raise typer.Exit(EXIT_FAILED)
     return runs
-
-
-def _say_what_there_is(store: RunStore, specs: list[RunSpec]) -> None:
-    done = len(store.of(specs))
-    parts = [f"{done} of {len(specs)} runs are there"] if done else []
-    parts += [f"{number_of(store.torn, 'torn line')} left out"] if store.torn else []
-    parts += [f"{number_of(store.older, 'line')} of other code or files left out"] if store.older else []
-    if parts:
-        typer.echo(f"{store.file}: {', '.join(parts)}", err=True)
 
 
 def _drive(
@@ -188,14 +187,25 @@ def _drive(
         ) from None
 
 
-def _drive_again(file: Path, run_id: str | None, record: Path | None) -> None:
-    """One run with a record. Raises CampaignError for an ID that the campaign does not have."""
-    table, folder = load_campaign(file), file.resolve().parent
+def _spec_of(file: Path, run_id: str, goal: Goal | None, out: Path | None) -> RunSpec:
+    """The run of the campaign, or of a search. Raises CampaignError for an ID that it does not have."""
+    table = load_campaign(file)
+    if goal is None:
+        spec, where = next((spec for spec in specs_of(table) if spec.id == run_id), None), "this campaign"
+    else:
+        kept = place_of_search(table, goal, out) / FILE
+        spec, where = kept_run(kept, run_id), f"the search in {kept}"
+    if spec is None:
+        raise CampaignError(f"{file}: --replay {run_id:.40}: no run of {where}; the report names them")
+    return spec
+
+
+def _drive_again(file: Path, run_id: str | None, record: Path | None, goal: Goal | None, out: Path | None) -> None:
+    """One run with a record. Raises one of ``BAD_INPUT``."""
+    folder = file.resolve().parent
     if run_id is None or record is None:
         raise CampaignError(f"{file}: --replay ID and --record FOLDER go together")
-    spec = next((spec for spec in specs_of(table) if spec.id == run_id), None)
-    if spec is None:
-        raise CampaignError(f"{file}: --replay {run_id:.40}: no run of this campaign; the report names them")
+    spec = _spec_of(file, run_id, goal, out)
     writable(record / "meta.json")
     mission, settings = mission_of(spec, folder), settings_of(spec)
     recorder = Recorder(record, mission, settings, spec.seed, arm=True, start_us=0)

@@ -16,7 +16,9 @@ from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.pictures import times
 from sitl.cli.campaign import BAD_INPUT, drive_campaign
 from sitl.cli.named import names_in
+from sitl.cli.runs import alone_in
 from sitl.experiments import drawing
+from sitl.generators.kinds import is_kind
 
 FILE, PLOT = "campaign.toml", "times.png"
 
@@ -42,7 +44,7 @@ def compare(
         file = out / FILE
         writable(file)
         _check(missions, planners, controllers)
-        with written(file), TemporaryDirectory(dir=out) as folder:
+        with alone_in(out), written(file), TemporaryDirectory(dir=out) as folder:
             tried = Path(folder) / FILE
             tried.write_text(_campaign(missions, tried.parent, planners, controllers, seeds), encoding="utf-8")
             _load(tried)
@@ -62,11 +64,16 @@ def compare(
 def _check(missions: list[Path], planners: str, controllers: str) -> None:
     """Raises CampaignError for what the campaign's file would be blamed for."""
     for mission in missions:
-        if mission.suffix and not mission.is_file():
+        if _is_file(mission) and not mission.is_file():
             raise CampaignError(f"{mission}: no such mission file")
     for option, listed in (("--planners", planners), ("--controllers", controllers)):
         if not names_in(listed):
             raise CampaignError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
+
+
+def _is_file(mission: Path) -> bool:
+    """Not a kind of ground: its words may end like a file's name, as ``rooms least_door_m=1.6`` does."""
+    return bool(mission.suffix) and not is_kind(str(mission).partition(" ")[0])
 
 
 def _load(file: Path) -> None:
@@ -79,7 +86,7 @@ def _load(file: Path) -> None:
 
 def _campaign(missions: list[Path], folder: Path, planners: str, controllers: str, seeds: int) -> str:
     """The campaign's file in a folder; a list of strings is written alike in JSON and TOML."""
-    worlds = [os.path.relpath(one, folder) if one.suffix else str(one) for one in missions]
+    worlds = [os.path.relpath(one, folder) if _is_file(one) else str(one) for one in missions]
     lists = {"worlds": worlds, "planners": names_in(planners), "controllers": names_in(controllers)}
     lines = [f"{key} = {json.dumps(values, ensure_ascii=False)}" for key, values in lists.items()]
     return "\n".join(['name = "compare"', *lines, f"runs = {seeds}"]) + "\n"

@@ -10,3 +10,10 @@ def statistics_fault(what: str) -> str:
     if find_spec("scipy") is not None:
         return ""
     return f"{what}: its statistics need scipy; install rover-companion[experiments]"
+
+
+def parquet_fault() -> str:
+    """Why ``--parquet`` cannot be written here, and the remedy; empty if it can."""
+    if find_spec("pyarrow") is not None:
+        return ""
+    return "--parquet: pyarrow is not installed; install rover-companion[parquet], or leave the option out"

@@ -16,7 +16,9 @@ from companion.cli.patience import Patience
 from companion.executive.warm_up import COMPILING, kernels_warm, warm_up
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.drive_run import check_spec, mission_of, settings_of
+from sitl.campaign.page_parts import number_of
 from sitl.campaign.run_spec import RunSpec
+from sitl.campaign.run_store import RunStore
 from sitl.generators.made_ground import NoWayError
 
 FILE = "runs.jsonl"
@@ -27,9 +29,13 @@ QUIET_S = 120.0
 QUIET = f"no run has ended for {QUIET_S:.0f} s: a long one, or a planner or controller that never answers"
 
 
-def number_of(count: int, what: str) -> str:
-    """The number with its word, like ``1 run`` or ``2 runs``."""
-    return f"{count} {what}{'' if count == 1 else 's'}"
+def say_what_there_is(store: RunStore, done: str) -> None:
+    """One line of what was kept before, and what of it does not count. ``done``: in words, empty for nothing."""
+    parts = [f"{done} {'is' if done == '1 run' else 'are'} there"] if done else []
+    parts += [f"{number_of(store.torn, 'torn line')} left out"] if store.torn else []
+    parts += [f"{number_of(store.older, 'line')} of other code or files left out"] if store.older else []
+    if parts:
+        _tell(f"{store.file}: {', '.join(parts)}")
 
 
 def check_all(left: list[RunSpec], folder: Path) -> None:

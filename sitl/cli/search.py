@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -12,12 +13,14 @@ from rich.console import Console
 
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import writable, written
-from sitl.campaign.campaign_file import CampaignTable, load_campaign
+from sitl.campaign.campaign_file import CampaignError, CampaignTable, load_campaign
+from sitl.campaign.page_parts import number_of
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.workers import driven_here
-from sitl.cli.runs import FILE, alone_in, check_all, number_of, progress, warm_up_all
+from sitl.cli.runs import FILE, alone_in, check_all, progress, say_what_there_is, warm_up_all
 from sitl.search.found_file import counted_from, differences, write_find
+from sitl.search.genes import genes_of
 from sitl.search.goals import Goal
 from sitl.search.minimise import minimised
 from sitl.search.search import Find, Generation, first_bases, searched
@@ -54,7 +57,8 @@ class _Keeper:
     def __init__(self, file: Path, goal: Goal, place: Path, drive: _Driver) -> None:
         self._file, self._goal, self._place, self._drive = file, goal, place, drive
         self._kinds: set[tuple[str, str]] = set()
-        self._wrong = 0
+        self.found: list[Find] = []
+        """Also those that were found while others were made small."""
         self.kept: list[KeptFind] = []
 
     def take(self, found: Sequence[Find]) -> None:
@@ -62,7 +66,7 @@ class _Keeper:
         waiting = deque(found)
         while waiting:
             find = waiting.popleft()
-            self._wrong += 1
+            self.found.append(find)
             kind = find.rule.value, replace(find.base, seed=0).id
             if kind not in self._kinds:
                 self._kinds.add(kind)
@@ -77,8 +81,8 @@ class _Keeper:
     def sum_up(self) -> None:
         """The last line."""
         more = f"; no more than {MOST_KEPT} are made small, {self.left_out} were left out" if self.left_out else ""
-        told = f"{number_of(self._wrong, 'find')} of {number_of(len(self._kinds), 'kind')}{more}"
-        typer.echo(told if self._wrong else "no run went wrong")
+        told = f"{number_of(len(self.found), 'find')} of {number_of(len(self._kinds), 'kind')}{more}"
+        typer.echo(told if self.found else "no run went wrong")
 
     def _keep(self, find: Find) -> list[Find]:
         what = f"{find.rule}: {find.base.world}, seed {find.base.seed}"
@@ -103,28 +107,59 @@ class _Keeper:
         return besides
 
 
+def place_of_search(table: CampaignTable, goal: Goal, out: Path | None) -> Path:
+    """The folder of all that a search writes."""
+    return (out or Path("out") / table.name) / f"search-{goal}"
+
+
 def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs: int) -> None:
     """All of it. Raises what a campaign raises."""
     table, folder, console = load_campaign(file), file.resolve().parent, Console()
-    place = (out or Path("out") / table.name) / f"search-{goal}"
+    place = place_of_search(table, goal, out)
     writable(place / FILE)
     with alone_in(place):
         digests = Digests(folder)
         store = RunStore(place / FILE, digests.of)
+        say_what_there_is(store, number_of(len(store.results), "run") if store.results else "")
         bases = first_bases(table)
+        _check_moves(file, table, bases)
         check_all(bases, folder)
         warm_up_all(bases, folder)
         drive = _Driver(store, digests, jobs)
         keeper, before = _Keeper(file, goal, place, drive), len(store.results)
         generations: list[Generation] = []
         ended = _search(console, searched(table, goal, budget, drive), budget, drive, keeper, generations)
-        if generations:
-            tries = drive.asked - sum(len(one.evaluations) for one in generations)
-            _put_out(table, SearchResult(goal, budget, generations, keeper.kept, keeper.left_out, tries, ended), place)
+        driven = sum(len(one.evaluations) for one in generations)
+        if driven:
+            result = SearchResult(
+                goal, budget, generations, keeper.kept, keeper.left_out, drive.asked - driven, ended,
+                keeper.found, _command(file, goal, out),
+            )  # fmt: skip
+            _put_out(table, result, place)
+        elif ended:
+            raise CampaignError(
+                f"{file}: search: no run could be driven, all that was tried contradicts itself; make bounds narrower"
+            )
         if not ended:
             kept = len(store.results) - before
             raise StoppedError(f"{number_of(kept, 'run')}, kept in {store.file}; the same command goes on")
         keeper.sum_up()
+
+
+def _check_moves(file: Path, table: CampaignTable, bases: Sequence[RunSpec]) -> None:
+    """Raises CampaignError where a search has nothing to move."""
+    for base in bases:
+        if not genes_of(table, base):
+            raise CampaignError(
+                f"{file}: search.parts: {', '.join(table.search.parts)}: moves nothing in {base.world}, whose ground a "
+                "file describes; name other parts, or leave this world out"
+            )
+
+
+def _command(file: Path, goal: Goal, out: Path | None) -> str:
+    """Of the search, without what differs from time to time."""
+    place = () if out is None else ("--out", str(out))
+    return shlex.join(("rover-sitl", "campaign", str(file), "--search", goal.value, *place))
 
 
 def _search(

@@ -83,6 +83,8 @@ def _given(kind: str, listed: list[str]) -> Parameters:
         name, equals, value = text.partition("=")
         if not equals:
             raise WorldError(f"--set {text:.60}: give a parameter as NAME=VALUE, like {_example(kind)}")
+        if name.strip() in values:
+            raise WorldError(f"--set {text:.60}: {name.strip()} is given twice")
         values[name.strip()] = value.strip()
     model = parameters_of(kind)
     try:

@@ -102,9 +102,9 @@ class Series:
         return sum(not one.reached for one in self.drives)
 
     @property
-    def bound_s(self) -> float:
-        """Mean of the least times; NaN where that was not asked for, or there is none."""
-        return float(np.mean([math.nan if one.bound_s is None else one.bound_s for one in self.drives]))
+    def bounds_s(self) -> Times:
+        """The least time of each drive; NaN where that was not asked for, or there is none."""
+        return np.array([math.nan if one.bound_s is None else one.bound_s for one in self.drives])
 
 
 HEAD = (
@@ -161,11 +161,12 @@ class DrivingReport(ExperimentReport):
             name: [one for one in self.series if one.name == name and course in (ALL, one.course)]
             for name in dict.fromkeys(series.name for series in self.series)
         }
-        bound_s = sum(one.bound_s for one in rows[KNOWN]) / len(rows[KNOWN])
         reference_s, known_s = together(rows[REFERENCE]), together(rows[KNOWN])
-        quotients = [_quotient(bound_s, other_s) for other_s in (_mean(reference_s), _mean(known_s), bound_s)]
-        bound = ["bound", "-" if math.isnan(bound_s) else f"{bound_s:.1f}", *quotients, *[""] * (len(HEAD) - 5)]
-        return [*(_row(own, reference_s, known_s, bound_s) for own in rows.values()), bound]
+        bounds_s: Times = np.mean([one.bounds_s for one in rows[KNOWN]], axis=0)
+        quotients = [_quotient(bounds_s, other_s) for other_s in (reference_s, known_s, bounds_s)]
+        unknown = np.isnan(bounds_s).any()
+        bound = ["bound", "-" if unknown else f"{bounds_s.mean():.1f}", *quotients, *[""] * (len(HEAD) - 5)]
+        return [*(_row(own, reference_s, known_s, bounds_s) for own in rows.values()), bound]
 
     def _draw(self) -> Figure:
         names = self._courses()
@@ -183,7 +184,9 @@ class DrivingReport(ExperimentReport):
                 reached_s = own[name].times_s[~np.isnan(own[name].times_s)]
                 if len(reached_s):
                     panel.plot([place, place], mean_interval(reached_s), color="0.2", linewidth=1.0)
-        bounds_s = [next(one.bound_s for one in self.series if one.course == name and one.known) for name in names]
+        bounds_s = [
+            next(one.bounds_s.mean() for one in self.series if one.course == name and one.known) for name in names
+        ]
         middles = np.arange(len(names))
         panel.hlines(bounds_s, middles - 0.42, middles + 0.42, color="0.1", linewidth=1.6, label="bound")
         panel.set_xticks(range(len(names)), names, rotation=20, fontsize=8, ha="right")
@@ -210,10 +213,11 @@ with several planners in the navigator. Each row is made of {runs} drives, with 
 same for all; each seed is another ground of its kind. *time s*: mean driving time of the drives that reached all
 targets; */ {REFERENCE}*: the same over that planner's, of the seeds with which both did; in brackets 95 % intervals, by
 resampling seeds. *{KNOWN}*: the whole map is known from the start, as if all had been seen before; */ known*: the time
-over that one, which is what better exploring could gain at all. *bound*: about the least time that physics allows, the
-shortest way of the footprint, any angle, at the mission's speeds, and the stays; fences do not count. *back*: steps in
-return mode; *missed*: drives in which a target was not reached; *Ah*: charge from the battery; *by curves*: the share
-of searches that the genetic algorithm answered with a curve of its own, and not a graph search.
+over that one, of the seeds with which both did, which is what better exploring could gain at all. *bound*: about the
+least time that physics allows, the shortest way of the footprint, any angle, at the mission's speeds, and the stays;
+fences do not count. */ bound*: over that of the same seeds. *back*: steps in return mode;
+*missed*: drives in which a target was not reached; *Ah*: charge from the battery; *by curves*: the share of searches
+that the genetic algorithm answered with a curve of its own, and not a graph search.
 
 {tables}
 
@@ -235,7 +239,7 @@ def together(series: Sequence[Series]) -> Times:
     return times_s
 
 
-def _row(own: Sequence[Series], reference_s: Times, known_s: Times, bound_s: float) -> list[str]:
+def _row(own: Sequence[Series], reference_s: Times, known_s: Times, bounds_s: Times) -> list[str]:
     """Figures of one planner, on one course or on several together, for people."""
     times_s, reports = together(own), [report for one in own for report in one.reports]
     searches = sum(report.searches for report in reports)
@@ -246,7 +250,7 @@ def _row(own: Sequence[Series], reference_s: Times, known_s: Times, bound_s: flo
         own[0].name,
         mean_with_interval(times_s[~np.isnan(times_s)], digits=1),
         "1" if own[0].name == REFERENCE else ratio_with_interval(pairs),
-        *(_quotient(_mean(times_s), other_s) for other_s in (_mean(known_s), bound_s)),
+        *(_quotient(times_s, other_s) for other_s in (known_s, bounds_s)),
         f"{np.mean([report.distance_m for report in reports]):.1f}",
         f"{np.mean([report.return_steps for report in reports]):.1f}",
         f"{sum(one.missed for one in own)}",
@@ -263,8 +267,10 @@ def _mean(values: Times) -> float:
     return float(known.mean()) if len(known) else math.nan
 
 
-def _quotient(time_s: float, other_s: float) -> str:
-    return "-" if math.isnan(time_s / other_s) else f"{time_s / other_s:.3f}"
+def _quotient(times_s: Times, others_s: Times) -> str:
+    """One mean over the other, of the seeds that both have: where only easy ones were driven to their end, of those."""
+    both = ~np.isnan(times_s + others_s)
+    return f"{times_s[both].mean() / others_s[both].mean():.3f}" if both.any() else "-"
 
 
 def shortfalls(series: tuple[Series, ...]) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from sitl.experiments import drawing
 from sitl.search.goals import FOUND, MEASURES, Goal
@@ -47,6 +48,7 @@ def best_values(goal: Goal, generations: Sequence[Generation]) -> Figure:
     panel.set_xlabel("runs of the search", fontsize=8)
     panel.set_ylabel(MEASURES[goal], fontsize=8)
     panel.tick_params(labelsize=8)
+    panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.spines[["top", "right"]].set_visible(False)
     figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     return figure

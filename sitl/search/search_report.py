@@ -15,9 +15,8 @@ from pathlib import Path
 
 from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignTable
-from sitl.campaign.page_parts import document, picture, table
+from sitl.campaign.page_parts import document, long_columns, number_of, picture, table
 from sitl.campaign.run_spec import RunSpec
-from sitl.campaign.runs_table import WIDE_LETTERS
 from sitl.campaign.summary import labels, varied
 from sitl.campaign.tables import records_of, write_records
 from sitl.search.best_values import best_values
@@ -27,6 +26,8 @@ from sitl.search.search import IMPOSSIBLE, Find, Generation
 
 MOST_STARTS = 500
 """More rows are not listed."""
+MOST_FINDS = 1000
+FIND_HEAD = ("rule", "world", "seed", "outcome", "touched", "refused", "closest m", "differs", "drive it again")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ class SearchResult:
     """All that a search has done so far.
 
     ``left_out``: kinds of finds that were too many to be made small; ``tries``: the runs that made finds small;
-    ``ended``: it was not stopped.
+    ``ended``: it was not stopped. ``found``: all finds, also of the tries. ``command``: of the search.
     """
 
     goal: Goal
@@ -58,11 +59,23 @@ class SearchResult:
     left_out: int
     tries: int
     ended: bool
+    found: Sequence[Find]
+    command: str
 
     @property
     def evaluations(self) -> int:
         """Runs of the search."""
         return sum(len(one.evaluations) for one in self.generations)
+
+    @property
+    def wrong(self) -> dict[str, list[Find]]:
+        """All finds by their run's ID: first those of the search, also of a generation that was not gone through."""
+        runs = dict[str, list[Find]]()
+        for find in [*(find for generation in self.generations for find in generation.finds), *self.found]:
+            own = runs.setdefault(find.spec.id, [])
+            if find.rule not in [one.rule for one in own]:
+                own.append(find)
+        return runs
 
 
 def write_search_report(file: Path, campaign: CampaignTable, result: SearchResult) -> None:
@@ -93,8 +106,9 @@ def page(campaign: CampaignTable, result: SearchResult) -> str:
     still = "" if result.ended else " <b>The search was stopped; the same command goes on.</b>"
     parts = [
         f"<h1>{html.escape(campaign.name)}: search for {result.goal}</h1>",
-        f"<p>{result.evaluations} of {result.budget} runs in {len(result.generations)} generations of {starts} starts, "
-        f"and {result.tries} runs that made finds small.{still}</p>",
+        f"<p>{result.evaluations} of {number_of(result.budget, 'run')} in "
+        f"{number_of(len(result.generations), 'generation')} of {number_of(starts, 'start')}, "
+        f"and {number_of(result.tries, 'run')} that made finds small.{still}</p>",
         "<h2>What was found</h2>",
         *_finds(result),
         "<h2>How near it came</h2>",
@@ -103,6 +117,7 @@ def page(campaign: CampaignTable, result: SearchResult) -> str:
             f"Each run: {MEASURES[result.goal]}. Crosses at the lower edge: runs that show what is looked for.",
         ),
         *_starts(campaign, result),
+        *_every_find(result),
     ]
     return document(f"{campaign.name}: search for {result.goal}", parts)
 
@@ -120,9 +135,8 @@ def _finds(result: SearchResult) -> list[str]:
         )
         for kept in result.kept
     ]  # fmt: skip
-    head = ("rule", "world", "seed", "outcome", "touched", "refused", "closest m", "differs", "drive it again")
-    wide = {1, 7} if any(len(line[1]) > WIDE_LETTERS for line in lines) else {7}
-    whole = table(head, lines, text={0, 1, 3}, wide=wide, code={8}) if lines else "<p>None is made small yet.</p>"
+    wide = {*long_columns(lines, [1]), 7}
+    whole = table(FIND_HEAD, lines, text={0, 1, 3}, wide=wide, code={8}) if lines else "<p>None is made small yet.</p>"
     more = f" {result.left_out} more kinds were left out." if result.left_out else ""
     return [
         f"<p>Runs of the search that went wrong: {html.escape(told)}. The first of each rule and combination is made "
@@ -130,6 +144,30 @@ def _finds(result: SearchResult) -> list[str]:
         "stands in the command that drives it again with a record; <code>rover-companion report FOLDER</code> shows "
         f"the record.{more}</p>",
         whole,
+    ]
+
+
+def _every_find(result: SearchResult) -> list[str]:
+    """As they were found; one that is like an earlier one is not made small, but can be driven again."""
+    wrong = result.wrong
+    if not wrong:
+        return []
+    lines = [
+        (
+            " ".join(find.rule for find in finds), finds[0].base.world, f"{finds[0].base.seed}",
+            finds[0].result.outcome, f"{finds[0].result.touched}", f"{finds[0].result.refused}",
+            f"{finds[0].result.clearance_m:.2f}", differences(finds[0]),
+            f"{result.command} --replay {run_id} --record out/{run_id}",
+        )
+        for run_id, finds in list(wrong.items())[:MOST_FINDS]
+    ]  # fmt: skip
+    wide = {*long_columns(lines, [1]), 7}
+    first = f"The first {MOST_FINDS} of {len(wrong)} runs; evaluations.csv has the <i>id</i> of each. "
+    return [
+        f"<h2>Every find</h2><p>{first if len(wrong) > MOST_FINDS else ''}As they were found, before any was made "
+        "small, and what was found while others were made small. The commands are to be given in the folder from which "
+        "the search was driven.</p>",
+        f'<div class="long">{table(FIND_HEAD, lines, text={0, 1, 3}, wide=wide, code={8})}</div>',
     ]
 
 
@@ -149,7 +187,7 @@ def _starts(campaign: CampaignTable, result: SearchResult) -> list[str]:
                 f"{len(runs)}", f"{min(near):.3f}" if near else "-", " ".join(shows) or "-",
             )
         )  # fmt: skip
-    long = [number for number in range(len(axes)) if any(len(line[number]) > WIDE_LETTERS for line in lines)]
+    long = long_columns(lines, range(len(axes)))
     more = f"The first {MOST_STARTS} of {len(lines)} starts. " if len(lines) > MOST_STARTS else ""
     head = (*axes, "start", "seed", "generations", "runs", "nearest", "found")
     return [

@@ -30,6 +30,8 @@ from companion.settings import parse_settings
 from sitl.campaign.campaign_file import load_campaign, run_count
 from sitl.campaign.run_spec import specs_of
 from sitl.faults.fault_file import load_faults
+from sitl.faults.tables import KINDS
+from sitl.search.genes import FAULTS
 from sitl.sensors.suites import suite_of
 from sitl.world.world_file import DoorTable, ObstacleTable, RoughTable, SlipperyTable, WorldTable, load_world
 
@@ -327,6 +329,14 @@ def test_the_run_that_the_page_on_campaigns_drives_again_exists() -> None:
     text = (ROOT / "docs" / "campaigns.md").read_text("utf-8")
     ((file, run_id),) = re.findall(r"rover-sitl campaign (\S+) --replay (\w+)", text)
     assert run_id in {spec.id for spec in specs_of(load_campaign(ROOT / file))}
+
+
+def test_the_faults_that_a_search_moves_are_those_of_the_page() -> None:
+    text = (ROOT / "docs" / "campaigns.md").read_text("utf-8").partition("Of faults:")[2]
+    table, _, after = text.partition("A kind happens")
+    assert {*re.findall(r"`(\w+)`", table)} == {*FAULTS}
+    others = len(KINDS) - len(FAULTS)
+    assert f"{others} kinds are not moved" in after.replace("Seven", "7")
 
 
 GENERATED_PAGES = {"results.md", "benchmarks.md"}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import platform
 import signal
 import socket
 import subprocess
@@ -12,13 +13,17 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from sitl.campaign.campaign_file import load_campaign
+from sitl.cli import compare
 from sitl.cli.commands import app
+from sitl.cli.runs import alone_in
 from tests.sitl.network.test_server import free_port
 from tests.support.rig import yard
-from tests.support.served import finished, mission_path, process, wait_until
+from tests.support.served import finished, interpreter, mission_path, process, wait_until
 
 CAMPAIGN = """
 worlds = ["yard.toml"]
@@ -85,6 +90,27 @@ def test_on_a_cluster_whose_worker_is_killed_the_figures_are_those_of_this_machi
 
 
 @pytest.mark.thorough
+@pytest.mark.slow
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names of its units are those of x86-64")
+def test_a_processor_without_wide_units_gives_the_same_figures(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As another machine might be: no vector units beyond the least, and no fused multiply-add. It compiles anew."""
+    campaign.write_text(CAMPAIGN.replace("runs = 4", "runs = 1"))
+    here, there = campaign.parent / "here", campaign.parent / "there"
+    assert CliRunner().invoke(app, ["campaign", str(campaign), "--out", str(here)]).exit_code == 0
+    for name, value in {
+        "NUMBA_CPU_NAME": "generic",
+        "NUMBA_CPU_FEATURES": "",
+        "NUMBA_CACHE_DIR": str(campaign.parent / "kernels"),
+        "NPY_DISABLE_CPU_FEATURES": " ".join(np.show_config(mode="dicts")["SIMD Extensions"]["found"]),
+    }.items():
+        monkeypatch.setenv(name, value)
+    with interpreter("sitl", "campaign", campaign, "--out", there) as run:
+        _, err = run.communicate(timeout=560)
+    assert run.returncode == 0, err
+    assert results(there) == results(here) and len(results(here)) == 2
+
+
+@pytest.mark.thorough
 def test_what_is_done_is_not_done_again_and_a_run_can_be_driven_again(
     campaign: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -113,13 +139,18 @@ def test_what_is_done_is_not_done_again_and_a_run_can_be_driven_again(
         (["short.toml", "--budget", "5"], "--budget goes with --search"),
         (["short.toml", "--search", "stuck", "--cluster", "tcp://h:1"], "--search and --cluster do not go together"),
         (["short.toml", "--search", "stuck", "--parquet"], "--search and --parquet do not go together"),
-        (["short.toml", "--search", "stuck", "--replay", "abc"], "--search and --replay do not go together"),
-        (["short.toml", "--search", "stuck", "--record", "r"], "--search and --record do not go together"),
-        (["short.toml", "--replay", "abc", "--record", "r", "--out", "o"], "--replay and --out do not go together"),
+        (["short.toml", "--search", "stuck", "--record", "r"], "--replay ID and --record FOLDER go together"),
+        (["short.toml", "--search", "stuck", "--replay", "abc", "--record", "r"], "no run of the search in out/short/"),
+        (
+            ["short.toml", "--search", "stuck", "--budget", "9", "--replay", "abc", "--record", "r"],
+            "--replay and --budget do not go together",
+        ),
+        (["short.toml", "--replay", "abc", "--record", "r", "--out", "o"], "--replay and --out go together with"),
         (["short.toml", "--cluster", "tcp://h:1", "--jobs", "2"], "--cluster and --jobs do not go together"),
         (["short.toml", "--replay", "abc", "--record", "r"], "no run of this campaign"),
         (["short.toml", "--out", "/proc/none"], "cannot be written"),
         (["short.toml", "--cluster", "tcp://127.0.0.1:1"], "nobody answers there"),
+        (["short.toml", "--cluster", "tls://127.0.0.1:1"], "write tcp://HOST:PORT"),
     ],
 )
 def test_what_cannot_be_done_is_one_line(
@@ -148,6 +179,30 @@ def test_planners_side_by_side_are_a_campaign_with_a_plot(campaign: Path, monkey
         bad = CliRunner().invoke(app, ["compare", *arguments])
         assert bad.exit_code == 2 and bad.output.startswith(says) and len(bad.output.splitlines()) == 1
     assert Path("out/compare/campaign.toml").read_text(encoding="utf-8") == kept, "the old report's commands still work"
+
+
+def test_ground_in_words_is_compared_like_a_mission(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Words that end in ``.6`` were taken for the name of a file."""
+    monkeypatch.chdir(campaign.parent)
+    driven: list[Path] = []
+    monkeypatch.setattr(compare, "drive_campaign", lambda file, out, jobs: driven.append(file) or [])
+    words = "rooms movers=2 least_door_m=1.6"
+    result = CliRunner().invoke(app, ["compare", words, "yard.toml", "--planners", "astar", "--seeds", "1"])
+    assert result.exit_code == 0 and load_campaign(driven[0]).worlds == [words, "../../yard.toml"], result.output
+
+
+def test_two_comparisons_in_one_folder_are_one_line_and_change_nothing(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second had written its campaign over that of the first, whose report then named runs that were not in it."""
+    monkeypatch.chdir(campaign.parent)
+    kept = Path("out/compare/campaign.toml")
+    kept.parent.mkdir(parents=True)
+    kept.write_text("of the first")
+    with alone_in(kept.parent):
+        second = CliRunner().invoke(app, ["compare", "yard.toml", "--planners", "astar", "--seeds", "1"])
+    assert second.exit_code == 2 and "another campaign writes its runs here" in second.output, second.output
+    assert len(second.output.splitlines()) == 1 and kept.read_text() == "of the first"
 
 
 GLASS = 'size_m = [20.0, 10.0]\n[[obstacle]]\nline_m = [[0.0, 8.0], [10.0, 8.0]]\nwidth_m = 0.3\nmaterial = "glass"\n'
@@ -189,6 +244,15 @@ def test_a_search_without_the_optimiser_is_one_line(campaign: Path, monkeypatch:
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 2
     assert result.output.splitlines()[-1] == "--search: cma is not installed; install rover-companion[search]"
+
+
+def test_a_table_that_cannot_be_written_is_told_before_hours_of_driving(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    result = CliRunner().invoke(app, ["campaign", str(campaign), "--parquet", "--out", str(campaign.parent / "out")])
+    assert result.exit_code == 2 and not list(campaign.parent.rglob("runs.jsonl")), result.output
+    assert result.output.startswith("--parquet: pyarrow is not installed; install rover-companion[parquet]")
 
 
 @pytest.mark.parametrize("command", ["campaign", "compare", "experiment gates"])

@@ -45,6 +45,33 @@ def test_each_combination_is_one_run_for_each_seed_and_seeds_come_one_after_the_
         ('worlds = ["yard"]\nplanners = ["dijkstr"]', "planners 1: unknown planner 'dijkstr'"),
         ('worlds = ["yard"]\ncontrollers = ["feet"]', "controllers"),
         ('worlds = ["yard", "yard"]', "worlds: a value stands there twice"),
+        ('worlds = ["rooms movers=0", "rooms  "]', "worlds: a value stands there twice"),
+        ('worlds = ["c.toml", "./c.toml"]', "worlds: a value stands there twice"),
+        ('worlds = ["yard"]\nsensors = ["beams", " beams"]', "sensors: a value stands there twice"),
+        (
+            'worlds = ["yard"]\nfaults = ["gps_loss start_s=1 duration_s=2", "gps_loss duration_s=2.0 start_s=1"]',
+            "faults: a value stands there twice",
+        ),
+        ('name = ".."\nworlds = ["yard"]', "name: '..' names no folder"),
+        ('name = " "\nworlds = ["yard"]', "name: ' ' names no folder"),
+        (f'worlds = ["yard"]\nseed = {2**64}', "seed: input should be less than or equal to 9007199254740992"),
+        (
+            'worlds = ["yard"]\n[search]\nsettings = { "guidance.look_ahead_m" = [-5.0, -1.0] }',
+            "search.settings: guidance.look_ahead_m: input should be greater than 0 (got -5)",
+        ),
+        (
+            'worlds = ["yard"]\n[search]\nsettings = { "guidance.look_ahead_m" = [1.0, inf] }',
+            "search.settings: guidance.look_ahead_m: input should be a finite number (got inf)",
+        ),
+        ('worlds = ["yard"]\n[search]\nparts = ["rover", "rover"]', "search.parts: one stands there twice"),
+        (
+            'worlds = ["yard"]\n[search]\nparts = ["rover"]\nsettings = { "guidance.look_ahead_m" = [1.0, 2.0] }',
+            'search.settings: moved only where "settings" stands in search.parts',
+        ),
+        (
+            'worlds = ["yard"]\n[search]\nsettings = { "navigator.doubts" = [1, inf] }',
+            "search.settings: navigator.doubts: input should be a",
+        ),
         ('worlds = ["yard"]\nfaults = ["no.toml"]', "no.toml: cannot be read"),
         ('worlds = ["yard"]\nsensors = ["lidr"]', "sensors 1: unknown sensors 'lidr'"),
         ('worlds = ["yard"]\nsensors = ["no.toml"]', "no.toml: cannot be read"),

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from sitl.campaign.campaign_file import CampaignTable
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, specs_of
-from sitl.campaign.run_store import Digests, RunStore
+from sitl.campaign.run_store import Digests, RunStore, _check_of
 from sitl.generators.measures import Difficulty
 
 TABLE = CampaignTable(name="c", worlds=["clutter", "yard"], runs=3)
@@ -65,6 +65,34 @@ def test_lines_of_other_code_do_not_count_and_a_changed_line_is_noticed(tmp_path
     again = RunStore(store.file, lambda spec: "d")
     assert again.torn == 1 and len(again.results) == len(SPECS) - 1
     assert json.loads(lines[0])["id"] == SPECS[0].id
+
+
+@pytest.mark.parametrize(
+    ("changes", "torn"),
+    [
+        ({"run": {"world": "rooms gone_m=1.4"}}, 0),
+        ({"run": {"sensors": "lidar-360 gone=1"}}, 0),
+        ({"run": {"world": "gone.toml"}}, 0),
+        ({"run": {"planner": "gone:Gone"}}, 0),
+        ({"run": {"world": 3}}, 1),
+        ({"run": {"world": ["clutter"]}}, 1),
+        ({"result": {"more": 1}}, 1),
+    ],
+)
+def test_a_line_of_another_version_is_left_out_and_told(
+    tmp_path: Path, changes: dict[str, dict[str, object]], torn: int
+) -> None:
+    """A parameter that was renamed since ended every later start in a traceback."""
+    store = filled(tmp_path)
+    body = json.loads(store.file.read_text().splitlines()[0])
+    del body["check"]
+    for part, values in changes.items():
+        body[part].update(values)
+    text = json.dumps({**body, "check": _check_of(body)})
+    store.file.write_text(f"{store.file.read_text()}{text}\n{'[' * 100_000}\n")
+    digests = Digests(tmp_path)
+    again = RunStore(store.file, lambda spec: "d" if spec in SPECS else digests.of(spec))
+    assert again.results == store.results and (again.torn, again.older) == (1 + torn, 1 - torn)
 
 
 def test_a_run_depends_on_its_own_files_alone(tmp_path: Path) -> None:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from sitl.campaign.campaign_file import CampaignTable
 from sitl.campaign.pictures import times
 from sitl.campaign.policies import ERROR
 from sitl.campaign.report import page
 from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
-from sitl.campaign.summary import HEAD, PAIR_HEAD, differences, interval, labels, rows, varied
+from sitl.campaign.summary import HEAD, PAIR_HEAD, differences, interval, labels, rows, short_labels, varied
 from sitl.campaign.tables import records_of
+from sitl.cli.campaign_outputs import put_out
 from sitl.generators.measures import Difficulty
 
 TABLE = CampaignTable(name="a", worlds=["clutter"], runs=20, controllers=["points", "motion-ga"])
@@ -81,6 +84,31 @@ def test_values_with_one_short_name_stay_apart() -> None:
     table = TABLE.model_copy(update={"worlds": ["a/m.toml", "b/m.toml", "c.toml"], "planners": ["p.q:A", "p.q:B"]})
     assert list(labels(table, "world").values()) == ["a/m.toml", "b/m.toml", "c"]
     assert list(labels(table, "planner").values()) == ["p.q:A", "p.q:B"]
+
+
+def test_names_are_whole_on_a_narrow_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of ``theta-star`` there was ``thet...``."""
+    table = TABLE.model_copy(update={"planners": ["hybrid", "theta-star"], "guard": [False, True], "runs": 1})
+    runs = [(spec, replace(RESULT, reached=0)) for spec in specs_of(table)]
+    put_out(Console(width=80), table, runs, Path("c.toml"), tmp_path)
+    said = capsys.readouterr().out
+    assert "clutter, theta-star, points," in said and "guard yes " in said and "\N{HORIZONTAL ELLIPSIS}" not in said
+
+
+FAULTS = ["none", "link_outage start_s=1 duration_s=2; gps_noise start_s=60 metres=0.2"]
+
+
+def test_values_in_words_leave_room_for_the_figures() -> None:
+    """On the terminal names were cut off after four letters, and on the page the figures lay far to the right."""
+    worlds = ["rooms least_door_m=1.6 movers=3", "yard house=1", "yard", "c.toml"]
+    table = TABLE.model_copy(update={"worlds": worlds, "faults": FAULTS, "planners": ["p.q:A", "astar"]})
+    assert list(short_labels(table, "world").values()) == ["rooms", "yard house=1", "yard", "c"]
+    assert list(short_labels(table, "faults").values()) == ["none", "link_outage; gps_noise"]
+    assert list(short_labels(table, "planner").values()) == ["p.q:A", "astar"]
+    runs = [(spec, replace(RESULT, reached=0)) for spec in specs_of(table)]
+    text = page(table, runs, Path("c.toml")).partition("<h2>Every run")[0]
+    wide = set(re.findall(r'<td class="wide">(.*?)</td>', text))
+    assert {worlds[0], FAULTS[1]} <= wide and "points" not in wide
 
 
 def test_an_error_takes_part_in_no_time() -> None:

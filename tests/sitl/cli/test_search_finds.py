@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import csv
+import re
+import shlex
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from companion.cli.entry import StoppedError
-from sitl.campaign.campaign_file import load_campaign
+from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
+from sitl.cli import campaign as command
 from sitl.cli import search
+from sitl.cli.commands import app
+from sitl.lockstep import Drive
 from sitl.search.goals import Goal
 
 
@@ -55,14 +61,72 @@ def test_each_kind_of_find_is_made_small_and_written_once(
     assert "collision: cylinders, seed 0: nothing" in said.err, "as far as it is"
 
 
-def test_a_stop_after_the_first_find_leaves_it_written(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stop_after_the_first_find_leaves_it_written(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """They were written at the very end."""
     monkeypatch.setattr(search, "driven_here", Drives(14))
     with pytest.raises(StoppedError, match="13 runs, kept in"):
         search.search_campaign(campaign, Goal.COLLISION, 40, campaign.parent / "out", 1)
     assert found(campaign) == ["collision", "refused"]
     report = (campaign.parent / "out" / "search-collision" / "report.html").read_text()
-    assert "The search was stopped" in report and report.count(" --replay ") == 2
+    assert "The search was stopped" in report and report.count(".toml --replay ") == 2
+    kept = campaign.parent / "out" / "search-collision" / "runs.jsonl"
+    with kept.open("a") as file:
+        file.write("{torn")
+    capsys.readouterr()
+    search.search_campaign(campaign, Goal.COLLISION, 40, campaign.parent / "out", 1)
+    assert f"{kept}: 13 runs are there, 1 torn line left out" in capsys.readouterr().err
+
+
+def test_every_find_can_be_driven_again_from_what_the_search_has_kept(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Those that were not made small, too."""
+    monkeypatch.setattr(search, "driven_here", Drives(14))
+    out = campaign.parent / "out"
+    with pytest.raises(StoppedError):
+        search.search_campaign(campaign, Goal.COLLISION, 40, out, 1)
+    place = out / "search-collision"
+    with (place / "runs.jsonl").open("a") as kept:
+        kept.write("{torn")
+    report = (place / "report.html").read_text().partition("Every find")[2]
+    found = re.findall(
+        r"<code>rover-sitl (campaign .*? --search collision --out .*? --replay (\w+) --record .*?)</code>", report
+    )
+    with (place / "evaluations.csv").open(newline="") as table:
+        assert {row["id"] for row in csv.DictReader(table)} < {run_id for _, run_id in found}, "all have gone wrong"
+    driven: list[RunSpec] = []
+
+    def prepared(spec: RunSpec, folder: Path, recorder: object) -> Drive:
+        driven.append(spec)
+        raise ValueError("driven")
+
+    monkeypatch.setattr(command, "prepared", prepared)
+    monkeypatch.chdir(campaign.parent)
+    for line, run_id in found[-2:]:
+        again = CliRunner().invoke(app, shlex.split(line))
+        assert again.exit_code == 2 and "ended with an error: ValueError: driven" in again.output, again.output
+        assert driven[-1].id == run_id
+    assert (place / "runs.jsonl").read_text().endswith("{torn"), "who only reads repairs nothing"
+    line = found[0][0].replace(found[0][1], "0" * 12)
+    none = CliRunner().invoke(app, shlex.split(line))
+    assert none.exit_code == 2 and f"no run of the search in {place / 'runs.jsonl'}" in none.output
+
+
+def test_a_search_with_nothing_to_move_or_to_drive_is_one_line(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first ended in a traceback of the optimiser, the second said that no run went wrong."""
+    monkeypatch.setattr(search, "driven_here", Drives(10_000))
+    (campaign.parent / "m.toml").write_text("[[target]]\nnorth_m = 1.0\neast_m = 2.0\n")
+    out = campaign.parent / "out"
+    campaign.write_text('worlds = ["clutter", "m.toml"]\n[search]\nparts = ["world", "traffic"]\n')
+    with pytest.raises(CampaignError, match=r"search\.parts: world, traffic: moves nothing in m\.toml"):
+        search.search_campaign(campaign, Goal.COLLISION, 4, out, 1)
+    bounds = '{ "guidance.min_speed_m_s" = [15.0, 16.0], "guidance.max_speed_m_s" = [0.1, 0.2] }'
+    campaign.write_text(f'worlds = ["m.toml"]\n[search]\nparts = ["settings"]\nsettings = {bounds}\n')
+    with pytest.raises(CampaignError, match=r"no run could be driven, all that was tried contradicts itself"):
+        search.search_campaign(campaign, Goal.COLLISION, 4, out, 1)
+    assert not (out / "search-collision" / "report.html").exists()
 
 
 def test_report_and_table_tell_how_the_search_went_and_what_drives_finds_again(
