@@ -73,6 +73,8 @@ STANDS_FIRST_M_S = 0.1
 """A rover that rolls faster is told to stand before it is told to go slower than this, or the other way. ArduRover's
 integral is full from braking and is emptied only where the rover is told to stand and has stopped (``ATC_STOP_SPEED``):
 else it rolls on, or back, for seconds, told to stand, at 0.2 m/s (2.2 s to a third)."""
+STOOD_S = 0.2
+"""So long it must have stood then: what the autopilot aims at is zero a little later than the speed."""
 BRAKES_AT_ONCE_M_S2 = 3.0
 """A rover that brakes so hard need not stand first: the integral has no time to fill."""
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
@@ -135,6 +137,8 @@ class MotionController:
         """Whether the rover rolled tail first when it was last led."""
         self._stands_first = False
         """Whether it was told to stand because of that."""
+        self._rolled_s = -math.inf
+        """When it rolled last."""
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
         """The path itself."""
@@ -191,6 +195,8 @@ class MotionController:
         self.backwards = view.rolls_back
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
         self._time_s = now_s
+        if view.speed_m_s > STANDS_M_S:
+            self._rolled_s = now_s
         self._note_way(view, passed_s)
         problem = self._problem(path, view, model)
         later = problem._replace(
@@ -258,7 +264,7 @@ class MotionController:
         slowest_m_s = STANDS_FIRST_M_S if _alone_s(view) == 0.0 else 0.0
         if onward_m_s >= slowest_m_s or view.following.deceleration_m_s2 > BRAKES_AT_ONCE_M_S2:
             return False
-        return rolls_m_s > (STANDS_M_S if self._stands_first else STANDS_FIRST_M_S)
+        return self._time_s - self._rolled_s < STOOD_S if self._stands_first else rolls_m_s > STANDS_FIRST_M_S
 
     def _braking(self, view: LocalView, worst: Problems) -> ToldVelocity:
         """The way to brake that keeps most room; straight on where there is enough, or where dragged and in doubt."""

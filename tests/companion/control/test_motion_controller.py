@@ -474,20 +474,19 @@ def test_a_rover_that_rolls_stands_before_it_is_told_to_go_the_other_way(wanted_
     """Else the autopilot's integral, full from braking, would push it on when it is told to stand again."""
     leads = MotionController(FOOTPRINT, Wants(wanted_m_s))
     at = replace(view(ground(), Pose(5.0, 10.0, 0.0, 0.0), 0.3), rolls_back=wanted_m_s > 0.0)
-    for speed_m_s, purpose, told_m_s in ((0.3, Purpose.BRAKE, 0.0), (0.04, Purpose.DRIVE, wanted_m_s)):
-        command = leads.follow(PATH, replace(at, speed_m_s=speed_m_s))
-        assert isinstance(command.setpoint, GuidedVelocity)
-        assert (command.purpose, command.setpoint.forward_m_s) == (purpose, told_m_s)
+    for time_s, speed_m_s, told_m_s in ((0.0, 0.3, 0.0), (0.1, 0.04, 0.0), (0.25, 0.04, wanted_m_s)):
+        command = leads.follow(PATH, replace(at, pose=replace(at.pose, time_s=time_s), speed_m_s=speed_m_s))
+        assert isinstance(command.setpoint, GuidedVelocity) and command.setpoint.forward_m_s == told_m_s
     same_way = replace(at, rolls_back=wanted_m_s < 0.0)
     assert leads.follow(PATH, same_way).purpose is Purpose.DRIVE
 
 
-@pytest.mark.parametrize(("settings", "told_m_s"), [(GUARDED, [0.0, 0.0, 0.06, 0.06]), (STRICT, [0.06] * 4)])
+@pytest.mark.parametrize(("settings", "told_m_s"), [(GUARDED, [0.0, 0.0, 0.0, 0.06, 0.06]), (STRICT, [0.06] * 5)])
 def test_a_rover_that_is_to_creep_stands_first(settings: Settings, told_m_s: list[float]) -> None:
     """The same integral pushes it back through standing (0.19 m/s for a second), unless it was told to stand."""
     leads, found = MotionController(FOOTPRINT, Wants(0.06)), []
-    for speed_m_s in (0.3, 0.08, 0.04, 0.08):
-        leads.follow(PATH, view(ground(), Pose(5.0, 10.0, 0.0, 0.0), speed_m_s, settings))
+    for time_s, speed_m_s in ((0.0, 0.3), (0.1, 0.08), (0.2, 0.04), (0.35, 0.04), (0.4, 0.08)):
+        leads.follow(PATH, view(ground(), Pose(5.0, 10.0, 0.0, time_s), speed_m_s, settings))
         assert leads.choice is not None
         found.append(leads.choice.told.speed_m_s)
     assert found == told_m_s
