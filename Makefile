@@ -85,11 +85,13 @@ soak: $(KERNELS)
 	$(BIN)/rover-sitl experiment soak --runs 100 --json out/soak.json --docs docs
 
 # The environment, with the versions of constraints.txt; once it is there, no network is needed. PYTHON=... chooses the
-# interpreter; otherwise it is the first one that works.
+# interpreter; otherwise it is the first one that works. One that is there and works is kept: a second interpreter's
+# files in it would make a mixture in which neither works.
 $(PROGRAM): pyproject.toml constraints.txt
-	@for python in $(or $(PYTHON),$(CANDIDATES)); do \
+	@if $(BIN)/python -c 'import pip, ssl, sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then exit; fi; \
+	for python in $(or $(PYTHON),$(CANDIDATES)); do \
 	  if "$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
-	    echo "making $(VENV) with $$("$$python" --version) ..."; "$$python" -m venv $(VENV); exit; \
+	    echo "making $(VENV) with $$("$$python" --version) ..."; "$$python" -m venv --clear $(VENV); exit; \
 	  fi; \
 	done; \
 	echo "rover-companion needs Python 3.11 or newer with its venv module; tried: $(or $(PYTHON),$(CANDIDATES))" >&2; exit 1
