@@ -81,7 +81,7 @@ def rows(campaign: CampaignTable, runs: Runs) -> list[list[str]]:
         for key, results in groups.items()
     ]
     if len(groups) > 1:
-        table.append(["all", *[""] * (len(axes) - 1), *without_intervals([_row([result for _, result in runs])])[0]])
+        table.append(["all", *[""] * (len(axes) - 1), *_row_of_all([result for _, result in runs])])
     return table
 
 
@@ -154,6 +154,13 @@ def _row(results: Sequence[RunResult]) -> list[str]:
         f"{len(results)}", share_with_interval(len(complete), len(results)), *map(str, (*counts, missed, errors)),
         mean_s, low_high, _over_bound(complete), closest, *means, _by_ga(results),
     ]  # fmt: skip
+
+
+def _row_of_all(results: Sequence[RunResult]) -> list[str]:
+    """Without intervals: runs of one seed lie on the same ground, so they would be too narrow."""
+    (row,) = without_intervals([_row(results)])
+    row[HEAD.index("95 %")] = "-"
+    return row
 
 
 def _over_bound(complete: Sequence[RunResult]) -> str:

@@ -43,7 +43,9 @@ def test_a_row_for_each_combination_and_one_for_all() -> None:
         and found["motion-ga"]["mean s"] == "49.5"
         and found["motion-ga"]["/bound"] == "1.98"
     )
-    assert found[""]["runs"] == "40"
+    assert found["points"]["95 %"] == "57.0 to 62.7"
+    of_all = found[""]
+    assert (of_all["runs"], of_all["complete"], of_all["95 %"]) == ("40", "0.975", "-"), "two runs lie on each ground"
 
 
 def test_a_pair_differs_in_one_axis_only_and_both_must_be_complete() -> None:
