@@ -94,7 +94,7 @@ def _run(name: str, commands: Callable[..., object]) -> int:
         raise KeyboardInterrupt from None
     except usage_error as error:
         where = error.ctx.command_path if error.ctx is not None else name
-        print(f"{where}: {error.format_message()}{_got(error)} (see {where} --help)", file=sys.stderr)
+        print(f"{where}: {_words(error.format_message())}{_got(error)} (see {where} --help)", file=sys.stderr)
         return EXIT_USAGE
     except OwnPartError as error:
         print(error, file=sys.stderr)
@@ -117,6 +117,11 @@ def _run(name: str, commands: Callable[..., object]) -> int:
     return code if isinstance(code, int) else 0
 
 
+def _words(message: str) -> str:
+    """A usage error without what pydantic calls it, and without a full stop, as more may follow."""
+    return message.replace(": Value error, ", ": ").rstrip(".")
+
+
 def _got(error: Exception) -> str:
     """The value that was given, which newer versions of typer leave out of their words; empty if it is not known."""
     from pydantic import ValidationError
@@ -125,7 +130,10 @@ def _got(error: Exception) -> str:
 
     if not isinstance(error.__cause__, ValidationError):
         return ""
-    value = error.__cause__.errors(include_url=False)[0]["input"]
+    fault = error.__cause__.errors(include_url=False)[0]
+    value = fault["input"]
+    if repr(value) in fault["msg"]:  # as of a name that is none of those known
+        return ""
     return f", got {reprlib.repr(value)}{number_hint(value)}"
 
 

@@ -39,6 +39,7 @@ def command(name: str, *arguments: str) -> list[str]:
         (("rover-sitl", "drive", "missions/field.plan", "--resolution-m", "0"), "'--resolution-m'"),
         (("rover-sitl", "drive", "missions/field.plan", "--resolution-m", "nan"), "'--resolution-m'"),
         (("rover-sitl", "drive", "missions/field.plan", "--resolution-m", "0,5"), "'0,5'"),
+        (("rover-sitl", "campaign", "c.toml", "--search", "colision"), "'--search': 'colision' is not one of"),
         (("rover-sitl", "fly"), "No such command 'fly'"),
         (("rover-sitl",), "Missing command"),
         (("rover-companion", "run", "missions/open.toml"), "Missing option '--connect'"),
