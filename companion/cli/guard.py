@@ -52,6 +52,8 @@ def guard(
 
 def _write(place: Path, text: str) -> None:
     place = place / FILE if place.is_dir() else place
+    if place.suffix != Path(FILE).suffix:
+        raise OutputError(f"{place}: the autopilot runs only scripts whose names end in .lua; name one, like {FILE}")
     in_folder(place)
     with replaced(place) as new:
         new.write_text(text, encoding="utf-8")

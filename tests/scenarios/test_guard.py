@@ -121,4 +121,6 @@ def test_nobody_there_and_a_place_that_cannot_be_written_are_told_in_a_line(
     nowhere = CliRunner().invoke(app, ["guard", "--write", str(tmp_path / "file" / ".." / "..")])
     assert nowhere.exit_code == 2 and len(nowhere.output.strip().splitlines()) == 1
     slip = CliRunner().invoke(app, ["guard", "--write", str(tmp_path / "no-card" / "x.lua")])
-    assert slip.exit_code == 2 and "there is no folder" in slip.output and list(tmp_path.iterdir()) == []
+    assert slip.exit_code == 2 and "there is no folder" in slip.output
+    no_script = CliRunner().invoke(app, ["guard", "--write", str(tmp_path / "guard.txt")])
+    assert no_script.exit_code == 2 and "names end in .lua" in no_script.output and list(tmp_path.iterdir()) == []
