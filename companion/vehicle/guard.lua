@@ -3,8 +3,8 @@
 -- A velocity lasts three seconds in ArduRover. Without this script a rover whose companion dies drives on for as long.
 -- It waits SCR_USER1 milliseconds (200 to 3000; 0: 300). It begins to watch with the companion's first setpoint in
 -- GUIDED, and ends when the mode is another one or the rover is disarmed: so it never acts against a pilot, nor on a
--- companion that ended well. Twice a second it tells as CMPGRD191, the number being the component it watches, how long it waits;
--- negative while HOLD is its doing.
+-- companion that ended well. Twice a second it tells as CMPGRD191, the number being the component it watches, how long
+-- it waits; negative while HOLD is its doing.
 local COMPANION = 191
 local GUIDED, HOLD = 15, 4
 local HEARTBEAT = 0
