@@ -11,6 +11,7 @@ import typer
 
 from companion.cli.inputs import EXIT_BAD_INPUT
 from companion.cli.patience import Patience
+from companion.core.own_parts import OwnKind, raised
 from companion.planning.contract_problems import tasks_for
 from companion.planning.planner import Planner
 from companion.planning.planner_contract import broken_by
@@ -61,7 +62,7 @@ def _judged(name: str, planner: Planner, problem: PlanningProblem, budget: Budge
         wrong = broken_by(planner, problem, budget, number)
         return wrong, not wrong and planner.plan(problem, budget, np.random.default_rng(number)).path is not None
     except Exception as error:
-        return " ".join(f"it raised {type(error).__name__}: {error}".split()), False
+        return f"it raised {raised(OwnKind.PLANNER, name, error)}", False
     finally:
         patience.end()
 

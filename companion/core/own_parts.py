@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from enum import StrEnum
 from importlib.metadata import entry_points
 from pathlib import Path
+from traceback import extract_tb
 from typing import Any
 
 from companion.core.interrupts import is_interrupt
@@ -73,7 +74,7 @@ def made_by(kind: OwnKind, name: str, needs: tuple[str, ...], *given: object) ->
     try:
         made = factory(*given)
     except Exception as error:
-        raise OwnPartError(f"{kind} {name!r:.80} cannot be made: {_reason(error)}") from error
+        raise OwnPartError(f"{kind} {name!r:.80} cannot be made: {raised(kind, name, error)}") from error
     missing = [part for part in needs if not hasattr(made, part)]
     if missing:
         raise OwnPartError(f"{kind} {name!r:.80} has no {missing[0]}; docs/planners.md shows one")
@@ -88,7 +89,7 @@ def blamed(kind: OwnKind, name: str) -> Iterator[None]:
     except Exception as error:
         if is_interrupt(error) or not looks_own(kind, name):
             raise
-        raise OwnPartError(f"{kind} {name!r:.80} fails: {_reason(error)}") from error
+        raise OwnPartError(f"{kind} {name!r:.80} fails: {raised(kind, name, error)}") from error
 
 
 def source_of(kind: OwnKind, name: str) -> Path | None:
@@ -99,6 +100,16 @@ def source_of(kind: OwnKind, name: str) -> Path | None:
     module = name.partition(":")[0] if ":" in name else getattr(part, "__module__", "")
     file = getattr(sys.modules.get(module), "__file__", None)
     return None if file is None else Path(file)
+
+
+def raised(kind: OwnKind, name: str, error: Exception) -> str:
+    """An error in one line, with the last line of the own part's file that led to it, where there is one."""
+    try:
+        file = source_of(kind, name) if looks_own(kind, name) else None
+    except OwnPartError:
+        file = None
+    lines = [one.lineno for one in extract_tb(error.__traceback__) if file is not None and Path(one.filename) == file]
+    return _reason(error) + (f" ({file.name}, line {lines[-1]})" if file is not None and lines else "")
 
 
 def _reason(error: Exception) -> str:
