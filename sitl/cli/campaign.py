@@ -223,4 +223,7 @@ def _drive_again(file: Path, run_id: str | None, record: Path | None, goal: Goal
         recorder.close(ended_by=ended_by)
     contacts = f", {report.collisions} contacts" if report.collisions else ""
     typer.echo(f"{spec.world}, seed {spec.seed}: {report.outcome} after {report.driving_time_s:.1f} s{contacts}")
-    typer.echo(f"record: {record}; rover-companion report {record} shows it")
+    if recorder.problem:
+        raise OutputError(recorder.problem)
+    place = recorder.directory  # another one than was asked for, if that has a record already
+    typer.echo(f"record: {place}; rover-companion report {place} shows it")

@@ -11,13 +11,17 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from companion.recording.recorder import Recorder
+from companion.safety.reasons import EndReason
 from sitl.campaign.campaign_file import load_campaign
+from sitl.campaign.run_spec import specs_of
 from sitl.cli import compare
 from sitl.cli.commands import app
 from sitl.cli.runs import alone_in
@@ -160,6 +164,30 @@ def test_what_cannot_be_done_is_one_line(
     result = CliRunner().invoke(app, ["campaign", *arguments])
     assert result.exit_code == 2 and says in result.output, result.output
     assert len(result.output.strip().splitlines()) == 1
+
+
+def test_the_record_of_a_single_run_is_named_where_it_is_and_one_that_ended_early_is_told(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder that was asked for was named, also if the record had gone to another one."""
+    report = SimpleNamespace(outcome="reached", driving_time_s=1.0, collisions=0)
+    drive = SimpleNamespace(run=lambda: report, ended_by=lambda reason: reason)
+    monkeypatch.setattr("sitl.cli.campaign.prepared", lambda *_: drive)
+    monkeypatch.chdir(campaign.parent)
+    run_id = next(iter(specs_of(load_campaign(campaign)))).id
+    command = ["campaign", "short.toml", "--replay", run_id, "--record", "rec"]
+    assert "record: rec; " in CliRunner().invoke(app, command).output
+    second = CliRunner().invoke(app, command)
+    assert second.exit_code == 0 and "record: rec-2; rover-companion report rec-2 shows it" in second.output
+
+    class FullDisk(Recorder):
+        def close(self, *, ended_by: EndReason | None = None) -> None:
+            super().close(ended_by=ended_by)
+            self.problem = "rec-3: the record has ended: No space left on device"
+
+    monkeypatch.setattr("sitl.cli.campaign.Recorder", FullDisk)
+    full = CliRunner().invoke(app, command)
+    assert full.exit_code == 2 and full.output.endswith("the record has ended: No space left on device\n")
 
 
 @pytest.mark.thorough
