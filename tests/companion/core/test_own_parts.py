@@ -11,14 +11,14 @@ from companion.core.own_parts import OwnKind, OwnPartError, blamed, made_by
 
 @pytest.fixture
 def lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "lines.py").write_text("def Lines(settings):\n    return [][settings]\n")
+    (tmp_path / "wrong_lines.py").write_text("def Lines(settings):\n    return [][settings]\n")
     monkeypatch.syspath_prepend(tmp_path)
 
 
 def test_the_line_at_which_a_part_of_ones_own_fails_is_told(lines: None) -> None:
     with pytest.raises(OwnPartError) as told:
-        made_by(OwnKind.PLANNER, "lines:Lines", (), 0)
-    assert str(told.value).endswith("cannot be made: IndexError: list index out of range (lines.py, line 2)")
+        made_by(OwnKind.PLANNER, "wrong_lines:Lines", (), 0)
+    assert str(told.value).endswith("cannot be made: IndexError: list index out of range (wrong_lines.py, line 2)")
 
 
 def test_what_fails_in_a_part_of_ones_own_is_told_with_its_name_in_one_line() -> None:
