@@ -1,4 +1,4 @@
-"""Setpoint check: the last look at each position or velocity before it is sent, against the map and the borders.
+"""Setpoint check: the last look at each setpoint before it is sent, against the map and the borders.
 
 A setpoint may be the last one that the autopilot receives, and it is followed to its end. So each one is asked
 whether the rover may be left alone with it. One that may not is replaced by velocity zero, reported and counted.
