@@ -168,6 +168,7 @@ class Report:
     """Setpoints rejected by the companion's own check before sending."""
     sim_time_s: float = 0.0
     driving_time_s: float = 0.0
+    """From the first movement to the last, to within a tick."""
     wall_time_s: float = 0.0
     compile_time_s: float = 0.0
     planning_time_s: float = 0.0
@@ -214,6 +215,7 @@ class Drive:
     def __post_init__(self) -> None:
         self.report = Report(self.seed)
         self._news: list[News] = []
+        self._driven_m = self._set_off_s = self._stood_s = 0.0
         began_s = stopwatch_s()
         warm_up(self.settings, self.mission.rover.turning_radius_m)
         self.simulator = self.scenario.simulator(self.seed)
@@ -253,7 +255,9 @@ class Drive:
         next_track_s = next_look_s = 0.0
         with WholeSteps() as steps:  # a record of half a tick would be a damaged one
             while not self.companion.done and self.simulator.time_s < self.time_limit_s:
+                before_s = self.simulator.time_s
                 steps.do(self.companion.tick)
+                self._note_motion(before_s)
                 self._news += self.companion.news
                 if self.simulator.time_s >= next_track_s:
                     next_track_s += TRACK_PERIOD_S
@@ -280,6 +284,14 @@ class Drive:
         """The companion's status, with all that has been said since the last call."""
         news, self._news = tuple(self._news), []
         return replace(self.companion.status(), news=news)
+
+    def _note_motion(self, before_s: float) -> None:
+        """Whether it rolled in this tick."""
+        if self.simulator.driven_m == self._driven_m:
+            return
+        if self._driven_m == 0.0:
+            self._set_off_s = before_s
+        self._driven_m, self._stood_s = self.simulator.driven_m, self.simulator.time_s
 
     def _note_track(self) -> None:
         truth = self.simulator.truth
@@ -308,12 +320,7 @@ class Drive:
             report.searches = len(companion.driver.searcher.seconds)
             report.genetic_searches = companion.driver.searcher.by_curves
             report.planning_time_s = math.fsum(companion.driver.searcher.seconds)
-        moving = [
-            p.time_s
-            for p, q in zip(report.track, report.track[1:], strict=False)
-            if (p.north_m, p.east_m) != (q.north_m, q.east_m)
-        ]
-        report.driving_time_s = moving[-1] - moving[0] if moving else 0.0
+        report.driving_time_s = self._stood_s - self._set_off_s if self._driven_m > 0.0 else 0.0
         seconds = sorted(companion.outcome.tick_seconds)
         report.tick_p99_ms = 1e3 * seconds[int(0.99 * (len(seconds) - 1))] if seconds else 0.0
         if report.collisions:

@@ -1,4 +1,4 @@
-"""A drive that is interrupted in the middle of a tick."""
+"""A drive in lock-step: interrupted in the middle of a tick, what it says of the rover, how long it drove."""
 
 from __future__ import annotations
 
@@ -65,3 +65,22 @@ def test_a_drive_says_how_the_rover_followed_where_motions_were_planned() -> Non
         texts.append(console.file.getvalue())  # type: ignore[attr-defined]
     assert "follows" in texts[0] and "m/s²" in texts[0]
     assert "follows" not in texts[1]
+
+
+def test_the_driving_time_is_from_the_first_movement_to_the_last_to_within_a_tick() -> None:
+    mission = load_mission(MISSION)
+    drive = Drive(mission, simulated(mission, None), Settings(), 0, NullRecorder(), time_limit_s=60.0)
+    moves_s: list[float] = []
+    advance_to_s, before_m = drive.simulator.advance_to_s, 0.0
+
+    def watched(time_s: float) -> None:
+        nonlocal before_m
+        advance_to_s(time_s)
+        if drive.simulator.driven_m > before_m:
+            moves_s.append(drive.simulator.time_s)
+        before_m = drive.simulator.driven_m
+
+    drive.simulator.advance_to_s = watched  # type: ignore[method-assign]
+    report = drive.run()
+    tick_s = 1.0 / drive.settings.link.tick_hz
+    assert moves_s and report.driving_time_s == pytest.approx(moves_s[-1] - moves_s[0], abs=2.0 * tick_s)
