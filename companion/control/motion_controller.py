@@ -75,6 +75,10 @@ integral is full from braking and is emptied only where the rover is told to sta
 else it rolls on, or back, for seconds, told to stand, at 0.2 m/s (2.2 s to a third)."""
 STOOD_S = 0.2
 """So long it must have stood then: what the autopilot aims at is zero a little later than the speed."""
+AGAINST_ROLL_M_S = 0.2
+"""A rover that rolls the other way though it is told to stand is told to go against that so fast. One that brakes
+better than ArduRover lets it stands before ArduRover aims at zero, and the integral then drives it back, by itself at
+0.25 m/s for a second."""
 BRAKES_AT_ONCE_M_S2 = 3.0
 """A rover that brakes so hard need not stand first: the integral has no time to fill."""
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
@@ -139,6 +143,8 @@ class MotionController:
         """Whether it was told to stand because of that."""
         self._rolled_s = -math.inf
         """When it rolled last."""
+        self._onward = 0.0
+        """The sign of the speed that was told last, but for zero."""
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
         """The path itself."""
@@ -210,8 +216,9 @@ class MotionController:
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
             return stop_for(Purpose.BLOCKED)
         found = self._planner.plan(problem, passed_s)
-        told = self._safe(found.motion[0], view, worst)
+        told = self._against_roll(self._safe(found.motion[0], view, worst), view, worst)
         self._stands_first = self._is_to_stand(told.speed_m_s, view)
+        self._onward = math.copysign(1.0, told.speed_m_s) if told.speed_m_s else self._onward
         assert self._window is not None
         ahead = self._position.faster_than(told.speed_m_s, path, view)
         self.choice = MotionChoice(now_s, problem, found, told, self._window.corner, ahead)
@@ -265,6 +272,14 @@ class MotionController:
         if onward_m_s >= slowest_m_s or view.following.deceleration_m_s2 > BRAKES_AT_ONCE_M_S2:
             return False
         return self._time_s - self._rolled_s < STOOD_S if self._stands_first else rolls_m_s > STANDS_FIRST_M_S
+
+    def _against_roll(self, told: ToldVelocity, view: LocalView, worst: Problems) -> ToldVelocity:
+        """To go slowly against it where it rolls the other way though it is told to stand: see ``AGAINST_ROLL_M_S``."""
+        rolls_m_s = -self._onward * view.forward_m_s
+        if told.speed_m_s or rolls_m_s <= STANDS_FIRST_M_S or view.following.deceleration_m_s2 > BRAKES_AT_ONCE_M_S2:
+            return told
+        against = told._replace(speed_m_s=self._onward * AGAINST_ROLL_M_S)
+        return against if _may_be_left_alone(against, view, worst) else told
 
     def _braking(self, view: LocalView, worst: Problems) -> ToldVelocity:
         """The way to brake that keeps most room; straight on where there is enough, or where dragged and in doubt."""

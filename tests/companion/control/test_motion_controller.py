@@ -413,13 +413,13 @@ class Wants:
     """Stands in for a planner that always wants this speed, straight on."""
 
     def __init__(self, speed_m_s: float) -> None:
-        motion = np.zeros((6, 2))
-        motion[:, 0] = speed_m_s
-        self._found = Found(motion, 1.0, motion[None], np.ones(1))
+        self.wanted_m_s = speed_m_s
         self.forgotten = 0
 
     def plan(self, problem: MotionProblem, passed_s: float) -> Found:
-        return self._found
+        motion = np.zeros((6, 2))
+        motion[:, 0] = self.wanted_m_s
+        return Found(motion, 1.0, motion[None], np.ones(1))
 
     def forget(self) -> None:
         self.forgotten += 1
@@ -498,6 +498,20 @@ def test_a_rover_that_brakes_hard_is_told_to_go_the_other_way_at_once() -> None:
     for brakes_m_s2, purpose in ((2.0, Purpose.BRAKE), (4.0, Purpose.DRIVE)):
         hard = replace(at, following=at.following._replace(deceleration_m_s2=brakes_m_s2))
         assert MotionController(FOOTPRINT, Wants(0.4)).follow(PATH, hard).purpose is purpose
+
+
+@pytest.mark.parametrize("onward", [1.0, -1.0])
+def test_a_rover_that_rolls_the_other_way_though_it_is_told_to_stand_is_told_to_go_against_it(onward: float) -> None:
+    """One that brakes better than it is let stands before the autopilot aims at zero: then the integral drives it."""
+    planner = Wants(0.4 * onward)
+    leads, found = MotionController(FOOTPRINT, planner), []
+    for time_s, onward_m_s in ((0.0, 0.4), (0.1, 0.3), (0.2, -0.09), (0.25, -0.12), (0.3, -0.12), (0.35, -0.09)):
+        at = view(ground(), Pose(5.0, 10.0, 0.0, time_s), abs(onward_m_s))
+        leads.follow(PATH, replace(at, rolls_back=onward_m_s * onward < 0.0))
+        planner.wanted_m_s = 0.0
+        assert leads.choice is not None
+        found.append(leads.choice.told.speed_m_s)
+    assert found == [0.4 * onward, 0.0, 0.0, 0.2 * onward, 0.2 * onward, 0.0]
 
 
 def test_it_foresees_that_it_backs_off() -> None:
