@@ -78,6 +78,8 @@ def test_each_combination_is_one_run_for_each_seed_and_seeds_come_one_after_the_
         ('name = "../x"\nworlds = ["yard"]', "name: string should match pattern"),
         ('worlds = ["yard"]\nplanners = ["collections:OrderedDict"]', "has no plan; docs/planners.md shows one"),
         ('worlds = ["yard"]\noff_model = [1.5]', "off_model"),
+        ('worlds = ["yard"]\ntime_limit_s = 1.0', "time_limit_s: 1 s end every run before its rover sets off"),
+        ('worlds = ["yard"]\ntime_limit_s = 45.0', "give more than 45, enough to drive, or leave it out"),
         ('worlds = ["yard"]\nruns = 2000000', "2000000 runs are more than 1000000"),
         ('worlds = ["yard"]\n[settings.a]\nguidance = { clear_m = 1.0 }', "settings.a: guidance.clear_m: unknown key"),
         (
