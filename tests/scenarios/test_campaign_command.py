@@ -9,12 +9,13 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 from typer.testing import CliRunner
 
@@ -64,6 +65,23 @@ def dask(what: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
     finally:
         run.kill()
         run.wait()
+
+
+@pytest.mark.slow
+def test_the_processes_of_a_campaign_that_was_killed_end_too(campaign: Path) -> None:
+    """They waited minutes for more work, with all that they had loaded."""
+    campaign.write_text(CAMPAIGN.replace("runs = 4", "runs = 1000"))
+    with interpreter("sitl", "campaign", campaign, "--jobs", "2", "--out", campaign.parent / "out") as run:
+        wait_until(lambda: len(lines_of(campaign.parent / "out")) >= 2)
+        children = psutil.Process(run.pid).children(recursive=True)
+        run.kill()
+    assert len(children) >= 2
+    try:
+        assert not psutil.wait_procs(children, timeout=30.0)[1]
+    finally:
+        for child in children:
+            with suppress(psutil.NoSuchProcess):
+                child.kill()
 
 
 @pytest.mark.thorough
