@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import time
 from functools import cache
-from threading import Thread
+from threading import Event, Thread
 
 LOOK_S = 1.0
 
@@ -18,6 +17,7 @@ def end_with(parent: int) -> None:
 
 
 def _watch(parent: int) -> None:
+    never = Event()
     while os.getppid() == parent:
-        time.sleep(LOOK_S)
+        never.wait(LOOK_S)
     os._exit(1)  # nobody is left to be told anything
