@@ -21,6 +21,7 @@ from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings, Settings, SettingsError
 from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
+from companion.storage.plain_words import plain
 from companion.storage.toml_file import read_table
 from sitl.autopilot.start_up import ARMABLE_S
 from sitl.campaign.worded import NOTHING, OWN, GroundSpec, SensorSpec, faults_of
@@ -202,8 +203,8 @@ def _fault_of_setting(section: str, key: str, value: float) -> str:
     try:
         Settings.model_validate({section: {key: value}})
     except ValidationError as error:
-        told = [one["msg"] for one in error.errors() if one["loc"] == (section, key)]
-        return f"{told[0].lower()} (got {value:g})" if told else ""
+        told = [plain(one) for one in error.errors() if one["loc"] == (section, key)]
+        return f"{told[0]} (got {value:g})" if told else ""
     return ""
 
 
