@@ -13,6 +13,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
+from companion.core.extras import not_installed
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.drive_run import drive
 from sitl.campaign.run_spec import RunResult, RunSpec
@@ -41,9 +42,7 @@ def driven_here(specs: Sequence[RunSpec], digests: Digests, jobs: int) -> Done:
     try:
         from joblib import Parallel, delayed
     except ImportError as error:
-        raise CampaignError(
-            f"--jobs {jobs}: joblib is not installed; install rover-companion[experiments], or leave the option out"
-        ) from error
+        raise CampaignError(not_installed(f"--jobs {jobs}", "experiments", "joblib")) from error
     done: Done = Parallel(n_jobs=jobs, return_as="generator_unordered")(
         delayed(_checked_apart)(os.getpid(), spec, digests.of(spec), digests.folder) for spec in specs
     )
@@ -59,9 +58,7 @@ def driven_on(specs: Sequence[RunSpec], digests: Digests, address: str) -> Done:
     try:
         from distributed import Client
     except ImportError as error:
-        raise CampaignError(
-            f"--cluster {address}: dask is not installed; install rover-companion[cluster], or leave the option out"
-        ) from error
+        raise CampaignError(not_installed(f"--cluster {address}", "cluster", "dask")) from error
     for name in ("distributed", "distributed.client"):  # they print tracebacks of what is told in one line
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:

@@ -19,6 +19,7 @@ import psutil
 import pytest
 from typer.testing import CliRunner
 
+from companion.core.extras import not_installed
 from companion.recording.recorder import Recorder
 from companion.safety.reasons import EndReason
 from sitl.campaign.campaign_file import load_campaign
@@ -289,7 +290,7 @@ def test_a_search_without_the_optimiser_is_one_line(campaign: Path, monkeypatch:
     command = ["campaign", str(campaign), "--search", "stuck", "--out", str(campaign.parent / "out")]
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 2
-    assert result.output.splitlines()[-1] == "--search: cma is not installed; install rover-companion[search]"
+    assert result.output.splitlines()[-1] == not_installed("--search", "search", "cma")
 
 
 def test_a_table_that_cannot_be_written_is_told_before_hours_of_driving(
@@ -298,7 +299,7 @@ def test_a_table_that_cannot_be_written_is_told_before_hours_of_driving(
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     result = CliRunner().invoke(app, ["campaign", str(campaign), "--parquet", "--out", str(campaign.parent / "out")])
     assert result.exit_code == 2 and not list(campaign.parent.rglob("runs.jsonl")), result.output
-    assert result.output.startswith("--parquet: pyarrow is not installed; install rover-companion[parquet]")
+    assert result.output.startswith("--parquet: pyarrow is not installed; install it: pip install 'rover-")
 
 
 @pytest.mark.parametrize("command", ["campaign", "compare", "experiment gates"])
@@ -315,4 +316,4 @@ def test_without_the_library_of_its_statistics_nothing_is_driven(
     }
     result = CliRunner().invoke(app, [*command.split(), *given[command]])
     assert result.exit_code == 2 and not list(campaign.parent.rglob("runs.jsonl")), result.output
-    assert result.output.splitlines()[-1].endswith("its statistics need scipy; install rover-companion[experiments]")
+    assert result.output.splitlines()[-1].endswith(not_installed("its statistics", "experiments", "scipy"))
