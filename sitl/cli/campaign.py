@@ -182,9 +182,8 @@ def _drive(
                     store.add(spec, result)
                 advance(1)
     except KeyboardInterrupt:
-        raise StoppedError(
-            f"{len(store.results) - others} of {number_of(total, 'run')}, kept in {store.file}; the same command goes on"
-        ) from None
+        kept = f"{len(store.results) - others} of {number_of(total, 'run')}"
+        raise StoppedError(f"{kept}, kept in {store.file}; the same command goes on") from None
 
 
 def _spec_of(file: Path, run_id: str, goal: Goal | None, out: Path | None) -> RunSpec:
