@@ -343,5 +343,5 @@ def _decompressed(data: bytes, max_bytes: int) -> bytes:
 def _reason(error: Exception) -> str:
     if isinstance(error, ValidationError):
         place, reason = first_fault(error)
-        return f"{place}: {reason.lower()}"
+        return f"{place}: {reason}"
     return str(error).splitlines()[0][:100] if str(error) else type(error).__name__

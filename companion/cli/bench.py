@@ -23,6 +23,7 @@ from companion.bench.report import as_json, head, rows, runs_explained
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, replaced, usable_settings, writable, written
 from companion.cli.plan import PlaceError, place_of
 from companion.core.clock import stopwatch_s
+from companion.core.extras import not_installed
 from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
 from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
@@ -155,8 +156,7 @@ def _contestants(planners: str, settings: Settings, console: Console, *, peers: 
         others, missing = installed_peers()
         contestants += others
         if missing:
-            remedy = "in the project's folder: .venv/bin/pip install -e '.\\[peers]'"
-            console.print(f"not installed: {', '.join(missing)} ({remedy})")
+            console.print(not_installed("--peers", "peers", *missing), markup=False)
     return contestants
 
 

@@ -9,11 +9,15 @@ import signal
 import sys
 from collections.abc import Callable
 from types import FrameType
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from companion.cli import kernel_cache
 from companion.core.interrupts import is_interrupt
 from companion.core.own_parts import OwnPartError
+
+if TYPE_CHECKING:  # loaded when something is wrong, as they take long
+    import typer
+    from pydantic_core import ErrorDetails
 
 EXIT_USAGE, EXIT_STOPPED = 2, 130
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -94,7 +98,7 @@ def _run(name: str, commands: Callable[..., object]) -> int:
         raise KeyboardInterrupt from None
     except usage_error as error:
         where = error.ctx.command_path if error.ctx is not None else name
-        print(f"{where}: {_words(error.format_message())}{_got(error)} (see {where} --help)", file=sys.stderr)
+        print(f"{where}: {_words(error)}{_got(error)} (see {where} --help)", file=sys.stderr)
         return EXIT_USAGE
     except OwnPartError as error:
         print(error, file=sys.stderr)
@@ -117,24 +121,33 @@ def _run(name: str, commands: Callable[..., object]) -> int:
     return code if isinstance(code, int) else 0
 
 
-def _words(message: str) -> str:
-    """A usage error without what pydantic calls it, and without a full stop, as more may follow."""
-    return message.replace(": Value error, ", ": ").rstrip(".")
+def _words(error: typer.BadParameter) -> str:
+    """A usage error without pydantic's own words, and without a full stop, as more may follow."""
+    from companion.storage.plain_words import plain
+
+    message, fault = error.format_message(), _fault_behind(error)
+    return (message if fault is None else message.replace(fault["msg"], plain(fault))).rstrip(".")
 
 
 def _got(error: Exception) -> str:
     """The value that was given, which newer versions of typer leave out of their words; empty if it is not known."""
-    from pydantic import ValidationError
-
     from companion.storage.validation import number_hint
 
-    if not isinstance(error.__cause__, ValidationError):
+    fault = _fault_behind(error)
+    if fault is None:
         return ""
-    fault = error.__cause__.errors(include_url=False)[0]
     value = fault["input"]
     if repr(value) in fault["msg"]:  # as of a name that is none of those known
         return ""
     return f", got {reprlib.repr(value)}{number_hint(value)}"
+
+
+def _fault_behind(error: Exception) -> ErrorDetails | None:
+    """What pydantic has found wrong; None where it was not asked."""
+    from pydantic import ValidationError
+
+    cause = error.__cause__
+    return cause.errors(include_url=False)[0] if isinstance(cause, ValidationError) else None
 
 
 def _let_go_of_output() -> None:

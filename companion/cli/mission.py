@@ -213,44 +213,48 @@ def command_text(command: DoCommand) -> str:
 
 def _ground(mission: Mission, settings: Settings) -> list[str]:
     grid = mission.grid
-    size = _fields_by_rover(mission, settings) if grid.by_footprint else _fields(mission, settings)
+    fields, gaps = _fields_by_rover(mission, settings) if grid.by_footprint else _fields(mission, settings)
     if grid.size is not None and grid.home is not None:
-        lines = [f"grid: {grid.size[0]} x {grid.size[1]} {size}, home is the middle of {place_text(grid.home)}"]
+        lines = [f"grid: {grid.size[0]} x {grid.size[1]} {fields}, home in the middle of {place_text(grid.home)}{gaps}"]
     else:
-        margin = "the larger of 25 m and half its extent" if grid.margin_m is None else f"{grid.margin_m:g} m"
-        lines = [f"grid: {size}, laid round home, targets and fences with a margin of {margin}"]
+        margin = "25 m (half its extent if that is more)" if grid.margin_m is None else f"{grid.margin_m:g} m"
+        lines = [f"grid: {fields}, laid round home, targets and fences with a margin of {margin}{gaps}"]
     lines += [f"keep out of {area_text(area)}" for area in mission.keep_out]
     lines += [f"keep inside {area_text(area)}" for area in mission.keep_in]
     lines += [f"weight {weighted.weight:g} in {area_text(weighted.area)}" for weighted in mission.weighted]
     return lines
 
 
-def _fields(mission: Mission, settings: Settings) -> str:
-    """How large fields are, and what narrow ground that leaves open."""
+def _fields(mission: Mission, settings: Settings) -> tuple[str, str]:
+    """How large fields are, and what narrow ground that leaves open: beginning and end of one sentence."""
     evidence = _map_at_start(mission, settings, narrow_sight=_has_beams(mission))
-    gaps = "" if evidence is None else f", for gaps of {open_gap_m(mission.rover, evidence):.1f} m or more"
-    return f"fields of {mission.grid.resolution_m:g} m{gaps}"
+    gaps = "" if evidence is None else _gaps(open_gap_m(mission.rover, evidence))
+    return f"fields of {mission.grid.resolution_m:g} m", gaps
 
 
-def _fields_by_rover(mission: Mission, settings: Settings) -> str:
+def _gaps(narrowest_m: float) -> str:
+    return f"; the rover drives through gaps of {narrowest_m:.1f} m or more"
+
+
+def _fields_by_rover(mission: Mission, settings: Settings) -> tuple[str, str]:
     """The same where the file does not say how large they are."""
     rover, size = mission.rover, _size_of(mission, settings)
     why = "as single beams need" if _has_beams(mission) else "by the rover's size"
     evidence = _map_at_start(mission, settings, narrow_sight=_has_beams(mission))
     if evidence is None:
-        return f"fields of {size.fine_m:g} m ({why}; larger on ground with more than {size.most})"
+        return f"fields of {size.fine_m:g} m ({why}; larger on ground with more than {size.most})", ""
     side_m = evidence.base.resolution_m
-    size_of = f"fields of {side_m:.3g} m ({why}"
+    most = narrower = ""
     if size.may_be_finer(side_m):
         of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
         smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"
-        size_of += f", and no more than {size.most}; for narrower gaps give {smaller}"
-    told = f"{size_of}), for gaps of {open_gap_m(rover, evidence):.1f} m or more"
+        most, narrower = f", and no more than {size.most} of them", f"; for narrower gaps give {smaller}"
+    told, gaps = f"fields of {side_m:.3g} m ({why}{most})", _gaps(open_gap_m(rover, evidence))
     by_beams = _map_at_start(mission, settings, narrow_sight=True)
     if by_beams is None or by_beams.base.resolution_m <= side_m:
-        return told
+        return told, f"{gaps}{narrower}"
     beams_m, gap_m = by_beams.base.resolution_m, open_gap_m(rover, by_beams)
-    return f"{told}; with single beams alone of {beams_m:.3g} m, for {gap_m:.1f} m"
+    return told, f"{gaps}, with single beams alone (fields of {beams_m:.3g} m) of {gap_m:.1f} m{narrower}"
 
 
 def _maps(mission: Mission, world: SimulatedWorld | None) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -46,6 +47,7 @@ from companion.mission.mission import Mission, MissionError, with_laps
 from companion.navigation.step_runner import ThreadRunner
 from companion.recording.record_format import STATE, RecordError
 from companion.recording.recorder import NullRecorder, Recorder
+from companion.safety.reasons import EndReason
 from companion.settings import Settings, SettingsError
 from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
 
@@ -230,6 +232,18 @@ def _load_planner(settings: Settings, mission: Mission, say: Callable[[str], Non
     settle()
 
 
+@dataclass(frozen=True, slots=True)
+class _Ender:
+    """Ends the run as the signal says that came."""
+
+    companion: Companion
+    signals: StopSignals
+
+    def stop(self) -> None:
+        """Safe in a signal handler."""
+        self.companion.stop(self.signals.why or EndReason.STOPPED_BY_USER)
+
+
 def _drive(rig: Rig, *, seed: int, arm: bool) -> int:
     """Drive to the end, close everything and print the result. Returns the exit code."""
     runner = ThreadRunner()
@@ -246,7 +260,7 @@ def _drive(rig: Rig, *, seed: int, arm: bool) -> int:
         keep_settings=rig.files.keep,
         lidars=rig.lidars,
     )
-    rig.stop.listener = companion
+    rig.stop.listener = _Ender(companion, rig.stop)
     service = Service(os.environ)
 
     if rig.page is not None:
@@ -284,5 +298,5 @@ def _drive(rig: Rig, *, seed: int, arm: bool) -> int:
             runner.close()
             rig.link.close()
             rig.lidars.close()
-            rig.recorder.close()
+            rig.recorder.close(ended_by=rig.stop.why)
     return ended(companion, rig)

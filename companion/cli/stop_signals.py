@@ -10,6 +10,7 @@ import typer
 
 from companion.cli.entry import EXIT_STOPPED
 from companion.cli.source import Stoppable
+from companion.safety.reasons import EndReason
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 AGAIN_S = 1.0
@@ -25,6 +26,8 @@ class StopSignals:
 
     def __init__(self) -> None:
         self.asked = False
+        self.why: EndReason | None = None
+        """Who asked: a person with Ctrl-C, or another program; None before."""
         self._listener: Stoppable | None = None
         self._again: threading.Timer | None = None
 
@@ -52,6 +55,7 @@ class StopSignals:
             signal.signal(number, handler)
 
     def _stop(self, number: int, frame: FrameType | None) -> None:
+        self.why = EndReason.STOPPED_BY_USER if number == signal.SIGINT else EndReason.TERMINATED
         if self._listener is not None:
             self.asked = True
             self._listener.stop()

@@ -102,7 +102,7 @@ def source_of(kind: OwnKind, name: str) -> Path | None:
     return None if file is None else Path(file)
 
 
-def raised(kind: OwnKind, name: str, error: Exception) -> str:
+def raised(kind: OwnKind, name: str, error: BaseException) -> str:
     """An error in one line, with the last line of the own part's file that led to it, where there is one."""
     try:
         file = source_of(kind, name) if looks_own(kind, name) else None
@@ -112,7 +112,7 @@ def raised(kind: OwnKind, name: str, error: Exception) -> str:
     return _reason(error) + (f" ({file.name}, line {lines[-1]})" if file is not None and lines else "")
 
 
-def _reason(error: Exception) -> str:
+def _reason(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:200]
 
 

@@ -39,6 +39,8 @@ STICKS = {"RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0}
 """The channels that the companion reads."""
 STATIONS = ("MAV_GCS_SYSID", "SYSID_MYGCS")
 """The same parameter in 4.7 and in older versions."""
+SCRIPTS = ("SCR_ENABLE", "SCR_USER1")
+"""A board that runs no scripts does not have them."""
 FAILSAFES = {"FS_ACTION": "A failsafe", "FS_EKF_ACTION": "A lost position"}
 PARAMETERS = (
     "OA_TYPE",
@@ -55,6 +57,7 @@ PARAMETERS = (
     *dict.fromkeys((*LIMITS, *THROTTLE_SCALE)),
     *STICKS,
     *STATIONS,
+    *SCRIPTS,
 )
 """The parameters that the checks need."""
 
@@ -146,8 +149,9 @@ def identity(seen: Survey) -> Iterator[Finding]:
 
 
 def _unheard(missing: Sequence[str], seen: Survey) -> list[str]:
-    """The parameters that should have been answered; of two names of one parameter, a firmware has one."""
+    """The parameters that should have been answered: not every board has those of scripts; of two names, it has one."""
     station = station_of(seen) is not None
+    missing = [name for name in missing if name not in SCRIPTS]
     return [name for name in missing if name not in STATIONS or (not station and name == STATIONS[0])]
 
 
@@ -388,13 +392,21 @@ def throttle(seen: Survey) -> Iterator[Finding]:
 def guarded(seen: Survey) -> Iterator[Finding]:
     """Whether a guard on the autopilot would stop a rover whose companion has fallen silent."""
     guard = seen.vehicle.guard
-    if guard is None:
+    meant = guard is None and seen.parameters.get("SCR_USER1", 0.0) > 0.0
+    if meant and seen.parameters.get("SCR_ENABLE") == 0.0:
+        says = "SCR_USER1 is set for a guard, but the autopilot runs no scripts: it would not stop the rover."
+        yield to_set("guard", Level.WARN, says, "SCR_ENABLE", 0.0, 1.0)
+    elif meant:
+        says = "SCR_USER1 is set for a guard, but none is heard: it would not stop the rover if the companion dies."
+        remedy = "upload it with `rover-companion guard --install`, and restart the autopilot"
+        yield Finding("guard", Level.WARN, says, remedy)
+    elif guard is None:
         says = "No guard on the autopilot: what the companion told last goes on for 3 s if it dies."
         yield Finding("guard", Level.NOTE, says, "`rover-companion guard` gives a script that ends it after 0.3 s")
     elif guard.waits_s > IN_TIME_S + 1e-6:
         says = f"The guard on the autopilot waits {guard.waits_s:g} s"
         says += f": with more than {IN_TIME_S:g} s planned motions keep more room, as without one."
-        yield Finding("late-guard", Level.NOTE, says, "set SCR_USER1 to 300")
+        yield Finding("late-guard", Level.NOTE, says, "set SCR_USER1 to 300, on a slow computer to 900 at most")
 
 
 def sticks(seen: Survey) -> Iterator[Finding]:

@@ -158,7 +158,7 @@ def _meta(directory: Path) -> RecordMeta:
         return RecordMeta.model_validate(values)
     except ValidationError as error:
         place, reason = first_fault(error)
-        raise RecordError(f"{file}: damaged: {place}: {reason.lower()}; nothing can be replayed") from error
+        raise RecordError(f"{file}: damaged: {place}: {reason}; nothing can be replayed") from error
 
 
 def _mission_and_settings(directory: Path, meta: RecordMeta) -> tuple[Mission, Settings]:

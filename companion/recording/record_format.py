@@ -57,7 +57,7 @@ class FileLength(BaseModel):
 class RecordMeta(BaseModel):
     """``meta.json``. ``end``: by file name; None until the record is closed. ``lidars``: as they were given.
 
-    ``ended_by``: why a simulated drive ended, by the name of the reason; empty: not known.
+    ``ended_by``: why a simulated drive ended, or who stopped a run, by the name of the reason; empty: not known.
     """
 
     model_config = ConfigDict(extra="ignore")
@@ -78,7 +78,7 @@ class RecordMeta(BaseModel):
 
     @property
     def end_reason(self) -> EndReason | None:
-        """Why a simulated drive ended. None: the run itself tells it."""
+        """Why a simulated drive ended, or who stopped a run. None: the run itself tells it."""
         return EndReason.__members__.get(self.ended_by)
 
 

@@ -215,7 +215,8 @@ class Recorder:
     def close(self, *, ended_by: EndReason | None = None) -> None:
         """Write what is left, and mark the record complete. Gives up on a disk that hangs. May be called again.
 
-        ``ended_by``: why, of a simulated drive, which may be broken off before the companion can end it.
+        ``ended_by``: why, of a simulated drive, which may be broken off before the companion can end it, and of a run
+        that a signal has stopped.
         """
         if self._closed:
             return

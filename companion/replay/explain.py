@@ -252,8 +252,7 @@ def explanation_lines(why: Explanation) -> list[str]:
         f"{math.degrees(pose.heading_rad) % 360.0:.0f} deg), last step in {here.x}, {here.y}; "
         f"target field {goal.x}, {goal.y}; past path of {past} field{'s' * (past != 1)}{returning}",
         f"map: {why.grid.width} x {why.grid.height} fields of {why.grid.resolution_m:g} m, "
-        f"{np.count_nonzero(why.known) / why.known.size:.0%} seen, "
-        f"{np.count_nonzero(why.grid.weights >= OBSTACLE)} are obstacles",
+        f"{map_line(why.ground.weights >= OBSTACLE, why.grid.weights >= OBSTACLE, why.known)}",
     ]
     for candidate in why.candidates:
         lines.append(
@@ -266,6 +265,19 @@ def explanation_lines(why: Explanation) -> list[str]:
     if decision.path:
         lines.append(_shares(why, np.asarray(decision.path)))
     return lines if why.motions is None else [*lines, *motion_lines(why.motions)]
+
+
+def map_line(closed: NDArray[np.bool_], barred: NDArray[np.bool_], known: NDArray[np.bool_]) -> str:
+    """How much was seen of what the mission leaves open. A wide fence would make a small share of it.
+
+    ``closed``: by fences or a map that was given; ``barred``: with obstacles seen so far, too.
+    """
+    others = int(np.count_nonzero(~closed))
+    seen, obstacles = (int(np.count_nonzero(fields & ~closed)) for fields in (known, barred))
+    shut = closed.size - others
+    told = f"{shut} closed by fences or a given map; of the other {others}, " if shut else ""
+    share = "less than 1%" if 0 < 100 * seen < others else f"{seen / max(others, 1):.0%}"
+    return f"{told}{seen} are seen ({share}), {obstacles} are barred by obstacles"
 
 
 RANKS = (0.0, 0.25, 0.5, 0.75, 1.0)

@@ -129,6 +129,8 @@ class EndReason(Enum):
 
     DONE = "done"
     STOPPED_BY_USER = "stopped by the user"
+    TERMINATED = "told to end by a signal"
+    """SIGTERM, as a service manager sends it, or a terminal that was closed."""
     NOBODY_HERE = "nobody is here to do what the companion waits for"
     NEVER_BEGINS = "{} since the start; it cannot be expected any more"
     TIME_LIMIT = "time limit reached"

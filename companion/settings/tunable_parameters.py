@@ -97,7 +97,7 @@ def changed(settings: Settings, parameter: Parameter, value: float) -> Settings:
     try:
         return settings.model_copy(update={parameter.section: type(section).model_validate(values)})
     except ValidationError as error:
-        raise RefusedError(first_fault(error)[1].lower()) from error
+        raise RefusedError(first_fault(error)[1]) from error
 
 
 def _refuse_crossed(settings: Settings, parameter: Parameter, value: float) -> None:

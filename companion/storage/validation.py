@@ -9,14 +9,8 @@ from typing import get_args
 
 from pydantic import BaseModel, ValidationError
 
-WANTED = {
-    "dict_type": "a table, with its keys below a line in [brackets]",
-    "model_type": "a table, with its keys below a line in [brackets]",
-    "model_attributes_type": "a table, with its keys below a line in [brackets]",
-    "list_type": "a list in [brackets]",
-    "tuple_type": "a list in [brackets]",
-}
-"""What pydantic calls by names of Python's types."""
+from companion.storage.plain_words import TABLE, plain
+
 MOST_OTHERS = 3
 """So many places are named beside the first fault."""
 NUMBER = r"[+-]?[\d_]+([.,]\d+)?"
@@ -27,7 +21,7 @@ QUOTED = {"float_type": NUMBER, "int_type": r"[+-]?\d+", "bool_type": "true|fals
 def first_fault(error: ValidationError) -> tuple[str, str]:
     """Place and reason of the first fault of a validation."""
     fault = error.errors(include_url=False)[0]
-    return ".".join(str(key) for key in fault["loc"]) or "file", " ".join(fault["msg"].split())
+    return ".".join(str(key) for key in fault["loc"]) or "file", plain(fault)
 
 
 def describe_first(error: ValidationError, model: type[BaseModel]) -> str:
@@ -89,22 +83,20 @@ def number_hint(text: object) -> str:
 def _described(error: ValidationError, model: type[BaseModel]) -> str:
     place, reason = first_fault(error)
     fault = error.errors(include_url=False)[0]
-    if fault["type"] == "missing":
-        return f"{place}: field required, it is missing"
-    if fault["type"] == "value_error":
-        return f"{place}: {fault['msg'].removeprefix('Value error, ')}"
+    if fault["type"] in ("missing", "value_error"):
+        return f"{place}: {reason}"
     if fault["type"] in ("list_type", "tuple_type") and isinstance(fault.get("input"), dict):
         name = ".".join(key for key in fault["loc"] if isinstance(key, str))
         return f"{place}: one table where several may stand; write [[{name}]] with double brackets"
-    if fault["type"] in WANTED:
-        return f"{place}: input should be {WANTED[fault['type']]} (got {fault.get('input')!r:.60})"
+    if reason == TABLE:
+        return f"{place}: {TABLE}, with its keys below a line in [brackets] (got {fault.get('input')!r:.60})"
     if fault["type"] == "too_long" and fault["ctx"]["field_type"] == "Tuple":  # [18,0, 3]: its comma is a new value
         wanted, given = fault["ctx"]["max_length"], fault.get("input")
         return f"{place}: {wanted} values are wanted (got {given!r:.60}); decimals have a point, 18.0 and not 18,0"
     if fault["type"] != "extra_forbidden":
         unquoted = QUOTED.get(fault["type"])
         hint = quoted_hint(fault.get("input"), unquoted) if unquoted else ""
-        return f"{place}: {reason.lower()} (got {fault.get('input')!r:.60}){hint}"
+        return f"{place}: {reason} (got {fault.get('input')!r:.60}){hint}"
     known = _known_keys(model, fault["loc"][:-1])
     near = alike(str(fault["loc"][-1]), known)
     hint = f", did you mean '{near}'?" if near else f"; known here: {', '.join(known)}"

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 
+from companion.vehicle.guard import IN_TIME_S
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
@@ -118,5 +119,6 @@ def _table(speed_m_s: float) -> Iterable[WantedParameter]:
     yield WantedParameter("FS_GCS_ENABLE", 1.0, INT8, why, Use.STATION)
     why = "scripts are run: the guard is one (rover-companion guard); counts from the next boot on"
     yield WantedParameter("SCR_ENABLE", 1.0, INT8, why, Use.GUARD)
-    why = "milliseconds of the companion's silence after which the guard stops the rover"
-    yield WantedParameter("SCR_USER1", GUARD_MS, REAL32, why, Use.GUARD)
+    why = f"milliseconds of the companion's silence after which the guard stops the rover; {GUARD_MS:g} is usual"
+    in_time_ms = 1000.0 * IN_TIME_S
+    yield WantedParameter("SCR_USER1", GUARD_MS, REAL32, why, Use.GUARD, Rule.AT_MOST, in_time_ms)

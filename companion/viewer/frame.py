@@ -58,7 +58,7 @@ BY_MODE = (WaitReason.PERSON_SETS_MODE, WaitReason.PERSON_SETS_MODE_AND_ARMS)
 MAKES_WAY, SEPARATOR = str(Hindrance.MAKES_WAY.value), "; "
 AGAIN = "trying again: the way was blocked"
 BY_COMPANION = "the companion asked for HOLD"
-PLAIN_ENDS = (EndReason.DONE, EndReason.STOPPED_BY_USER)
+PLAIN_ENDS = (EndReason.DONE, EndReason.STOPPED_BY_USER, EndReason.TERMINATED)
 """The others are told as what ended the run."""
 PAUSED = "paused: after that it waits for Go on"
 NOT_REACHED = {TargetStatus.PENDING: "not reached"}

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.app import Companion
+from companion.core.extras import not_installed
 from companion.core.frames import LocalFrame, NedPoint
 from companion.mapping.evidence_map import EvidenceMap
 from companion.navigation.field_step import Decision
@@ -75,7 +76,7 @@ class McapError(Exception):
 def check_mcap() -> None:
     """Raises McapError if the library is not installed."""
     if find_spec("mcap") is None:
-        raise McapError("--mcap: mcap is not installed; install rover-companion[mcap]")
+        raise McapError(not_installed("--mcap", "mcap", "mcap"))
 
 
 class McapReport(ReplayObserver):

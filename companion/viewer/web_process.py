@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.core.clock import stopwatch_s
+from companion.core.extras import not_installed
 from companion.storage.files import OsDisk, read_at_most, replace_file
 from companion.viewer import wire
 
@@ -95,11 +96,7 @@ def web_place(text: str, token_file: Path | None) -> WebPlace:
         )
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
-        names = f"{', '.join(missing)} {'are' if len(missing) > 1 else 'is'}"
-        raise WebError(
-            f"--web: {names} not installed; install rover-companion[web] "
-            "(in the project's folder: .venv/bin/pip install -e '.[web]')"
-        )
+        raise WebError(not_installed("--web", "web", *missing))
     return place
 
 

@@ -21,7 +21,9 @@ from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings, Settings, SettingsError
 from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
+from companion.storage.plain_words import plain
 from companion.storage.toml_file import read_table
+from sitl.autopilot.start_up import ARMABLE_S
 from sitl.campaign.worded import NOTHING, OWN, GroundSpec, SensorSpec, faults_of
 from sitl.faults.fault_file import FaultFileError
 from sitl.generators.kinds import GroundKind
@@ -31,6 +33,8 @@ SHIPPED = "shipped"
 Share = Annotated[float, Field(ge=0.0, le=0.9)]
 Seconds = Annotated[float, Field(ge=0.0, le=2.0)]
 MOST_RUNS = 1_000_000
+SETS_OFF_S = ARMABLE_S + 2.0
+"""No rover rolls earlier: it is armed after the start-up and sent off then (measured: 45.3 s at the earliest)."""
 GREATEST_SEED = 2**53
 """Every program that reads a table has whole numbers as large as this."""
 
@@ -94,6 +98,11 @@ def load_campaign(path: Path) -> CampaignTable:
     table = read_table(path, CampaignTable, CampaignError, "docs/campaigns.md describes the file")
     folder = path.resolve().parent
     _check_names(path, table)
+    if table.time_limit_s <= SETS_OFF_S:
+        raise CampaignError(
+            f"{path}: time_limit_s: {table.time_limit_s:g} s end every run before its rover sets off (the autopilot's "
+            f"start-up takes {ARMABLE_S:g} s); give more than {SETS_OFF_S:g}, enough to drive, or leave it out"
+        )
     count = run_count(table)
     if count > MOST_RUNS:
         raise CampaignError(f"{path}: {count} runs are more than {MOST_RUNS}; make the lists shorter")
@@ -194,8 +203,8 @@ def _fault_of_setting(section: str, key: str, value: float) -> str:
     try:
         Settings.model_validate({section: {key: value}})
     except ValidationError as error:
-        told = [one["msg"] for one in error.errors() if one["loc"] == (section, key)]
-        return f"{told[0].lower()} (got {value:g})" if told else ""
+        told = [plain(one) for one in error.errors() if one["loc"] == (section, key)]
+        return f"{told[0]} (got {value:g})" if told else ""
     return ""
 
 

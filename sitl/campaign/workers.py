@@ -6,16 +6,19 @@ Nouns: worker.
 from __future__ import annotations
 
 import logging
+import os
 import socket
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
+from companion.core.extras import not_installed
 from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.drive_run import drive
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests
+from sitl.campaign.worker_end import end_with
 from sitl.campaign.worker_start import begin
 
 Done = Iterator[tuple[RunSpec, RunResult]]
@@ -39,11 +42,9 @@ def driven_here(specs: Sequence[RunSpec], digests: Digests, jobs: int) -> Done:
     try:
         from joblib import Parallel, delayed
     except ImportError as error:
-        raise CampaignError(
-            f"--jobs {jobs}: joblib is not installed; install rover-companion[experiments], or leave the option out"
-        ) from error
+        raise CampaignError(not_installed(f"--jobs {jobs}", "experiments", "joblib")) from error
     done: Done = Parallel(n_jobs=jobs, return_as="generator_unordered")(
-        delayed(_checked)(spec, digests.of(spec), digests.folder) for spec in specs
+        delayed(_checked_apart)(os.getpid(), spec, digests.of(spec), digests.folder) for spec in specs
     )
     return _told(done, "a process of --jobs has ended (for want of memory?)")
 
@@ -57,9 +58,7 @@ def driven_on(specs: Sequence[RunSpec], digests: Digests, address: str) -> Done:
     try:
         from distributed import Client
     except ImportError as error:
-        raise CampaignError(
-            f"--cluster {address}: dask is not installed; install rover-companion[cluster], or leave the option out"
-        ) from error
+        raise CampaignError(not_installed(f"--cluster {address}", "cluster", "dask")) from error
     for name in ("distributed", "distributed.client"):  # they print tracebacks of what is told in one line
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
@@ -125,6 +124,12 @@ def _checked(spec: RunSpec, digest: str, folder: Path) -> tuple[RunSpec, RunResu
             "the same command drives again what that changes"
         )
     return spec, result
+
+
+def _checked_apart(parent: int, spec: RunSpec, digest: str, folder: Path) -> tuple[RunSpec, RunResult]:
+    """The same in a process that ``parent`` began."""
+    end_with(parent)
+    return _checked(spec, digest, folder)
 
 
 def _checked_on_a_worker(spec: RunSpec, digest: str, folder: Path) -> tuple[RunSpec, RunResult]:

@@ -145,7 +145,7 @@ def drive_campaign(
         if left:
             check_all(left, folder)
             try:
-                _drive(console, left, store, digests, jobs, cluster)
+                _drive(console, left, done, store, digests, jobs, cluster)
             except StoppedError as error:
                 stopped = error
         runs = store.of(specs)
@@ -164,27 +164,26 @@ def drive_campaign(
 def _drive(
     console: Console,
     left: list[RunSpec],
+    before: int,
     store: RunStore,
     digests: Digests,
     jobs: int,
     cluster: str | None,
 ) -> None:
-    """All that is left. Ctrl-C ends it with StoppedError; what is done is kept."""
+    """All that is left; ``before`` are done. Ctrl-C ends it with StoppedError; what is done is kept."""
     if cluster is None:
         warm_up_all(left, digests.folder)
-    before = len(store.results)
+    total, others = before + len(left), len(store.results) - before
     done: Done = driven_here(left, digests, jobs) if cluster is None else driven_on(left, digests, cluster)
     try:
-        with progress(console, len(left)) as advance:
+        with progress(console, total, before) as advance:
             for spec, result in done:
                 with written(store.file):
                     store.add(spec, result)
                 advance(1)
     except KeyboardInterrupt:
-        kept = len(store.results) - before
-        raise StoppedError(
-            f"{kept} of {number_of(len(left), 'run')}, kept in {store.file}; the same command goes on"
-        ) from None
+        kept = f"{len(store.results) - others} of {number_of(total, 'run')}"
+        raise StoppedError(f"{kept}, kept in {store.file}; the same command goes on") from None
 
 
 def _spec_of(file: Path, run_id: str, goal: Goal | None, out: Path | None) -> RunSpec:

@@ -72,15 +72,15 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def progress(console: Console, total: int) -> Iterator[Callable[[int], None]]:
-    """A bar, or a few lines where there is no terminal; it is told how many more are done."""
+def progress(console: Console, total: int, before: int = 0) -> Iterator[Callable[[int], None]]:
+    """A bar, or a few lines where there is no terminal; it is told how many more are done. ``before``: already."""
     columns = (
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
         TextColumn("left:"), TimeRemainingColumn(),
     )  # fmt: skip
-    done = told = 0
+    done, told = before, LINES * before // total
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-        task = progress.add_task("runs", total=total)
+        task = progress.add_task("runs", total=total, completed=before)
         patience = Patience(QUIET_S, lambda: progress.console.print(QUIET) if console.is_terminal else _tell(QUIET))
         patience.begin()
 

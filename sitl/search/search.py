@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from companion.core.extras import not_installed
 from companion.settings import SettingsError
 from sitl.campaign.campaign_file import CampaignError, CampaignTable
 from sitl.campaign.drive_run import settings_of
@@ -170,7 +171,7 @@ def _optimiser(genes: tuple[Gene, ...], base: RunSpec, number: int) -> Any:
     try:
         import cma
     except ImportError as error:
-        raise CampaignError("--search: cma is not installed; install rover-companion[search]") from error
+        raise CampaignError(not_installed("--search", "search", "cma")) from error
     rng = np.random.default_rng((base.seed, number, STREAM))
     usual = np.array([gene.share(gene.usual) for gene in genes])
     begin = usual + rng.uniform(0.0, 0.5, len(genes)) * (rng.uniform(0.0, 1.0, len(genes)) - usual)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 import time
 from pathlib import Path
@@ -86,6 +87,27 @@ def test_a_planner_that_breaks_the_contract_is_told_with_the_problem(
     number = told.output.rpartition("--seed ")[2].strip()
     again = CliRunner().invoke(app, ["check-planner", lines, "--problems", "1", "--seed", number])
     assert again.output == told.output
+
+
+def test_a_planner_that_ends_the_program_is_told_in_one_line_with_the_problem(lines: str) -> None:
+    text = Path("lines.py").read_text(encoding="utf-8")
+    Path("lines.py").write_text(text.replace("fields = poly", "raise SystemExit(0)\n        fields = poly"))
+    told = CliRunner().invoke(app, ["check-planner", lines])
+    assert told.exit_code == 3, told.output
+    assert told.output.startswith("lines:Lines: problem 0: it raised SystemExit: 0 (lines.py, line ")
+    sys.modules.pop("lines")
+    Path("lines.py").write_text("raise SystemExit(0)\n")
+    told = CliRunner().invoke(app, ["check-planner", lines])
+    assert told.exit_code == 2
+    assert told.output == "planner 'lines:Lines' cannot be loaded: it ended with SystemExit: 0\n"
+
+
+def test_a_planner_that_never_finds_a_path_is_told_with_the_first_problem(lines: str) -> None:
+    text = Path("lines.py").read_text(encoding="utf-8")
+    Path("lines.py").write_text(text.replace("is not PathFault.NONE", "is not None"), encoding="utf-8")
+    told = CliRunner().invoke(app, ["check-planner", lines, "--problems", "20"])
+    assert told.exit_code == 3, told.output
+    assert re.search(r"no path in any of \d+ problems that have one; the first, problem \d+:\n[.#ST]+\n", told.output)
 
 
 @pytest.mark.parametrize(

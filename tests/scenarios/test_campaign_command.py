@@ -9,15 +9,17 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 from typer.testing import CliRunner
 
+from companion.core.extras import not_installed
 from companion.recording.recorder import Recorder
 from companion.safety.reasons import EndReason
 from sitl.campaign.campaign_file import load_campaign
@@ -64,6 +66,23 @@ def dask(what: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
     finally:
         run.kill()
         run.wait()
+
+
+@pytest.mark.slow
+def test_the_processes_of_a_campaign_that_was_killed_end_too(campaign: Path) -> None:
+    """They waited minutes for more work, with all that they had loaded."""
+    campaign.write_text(CAMPAIGN.replace("runs = 4", "runs = 1000"))
+    with interpreter("sitl", "campaign", campaign, "--jobs", "2", "--out", campaign.parent / "out") as run:
+        wait_until(lambda: len(lines_of(campaign.parent / "out")) >= 2)
+        children = psutil.Process(run.pid).children(recursive=True)
+        run.kill()
+    assert len(children) >= 2
+    try:
+        assert not psutil.wait_procs(children, timeout=30.0)[1]
+    finally:
+        for child in children:
+            with suppress(psutil.NoSuchProcess):
+                child.kill()
 
 
 @pytest.mark.thorough
@@ -271,7 +290,7 @@ def test_a_search_without_the_optimiser_is_one_line(campaign: Path, monkeypatch:
     command = ["campaign", str(campaign), "--search", "stuck", "--out", str(campaign.parent / "out")]
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 2
-    assert result.output.splitlines()[-1] == "--search: cma is not installed; install rover-companion[search]"
+    assert result.output.splitlines()[-1] == not_installed("--search", "search", "cma")
 
 
 def test_a_table_that_cannot_be_written_is_told_before_hours_of_driving(
@@ -280,7 +299,7 @@ def test_a_table_that_cannot_be_written_is_told_before_hours_of_driving(
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     result = CliRunner().invoke(app, ["campaign", str(campaign), "--parquet", "--out", str(campaign.parent / "out")])
     assert result.exit_code == 2 and not list(campaign.parent.rglob("runs.jsonl")), result.output
-    assert result.output.startswith("--parquet: pyarrow is not installed; install rover-companion[parquet]")
+    assert result.output.startswith("--parquet: pyarrow is not installed; install it: pip install 'rover-")
 
 
 @pytest.mark.parametrize("command", ["campaign", "compare", "experiment gates"])
@@ -297,4 +316,4 @@ def test_without_the_library_of_its_statistics_nothing_is_driven(
     }
     result = CliRunner().invoke(app, [*command.split(), *given[command]])
     assert result.exit_code == 2 and not list(campaign.parent.rglob("runs.jsonl")), result.output
-    assert result.output.splitlines()[-1].endswith("its statistics need scipy; install rover-companion[experiments]")
+    assert result.output.splitlines()[-1].endswith(not_installed("its statistics", "experiments", "scipy"))

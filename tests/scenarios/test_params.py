@@ -92,7 +92,7 @@ def test_compared_with_the_rover(tmp_path: Path) -> None:
         served.close()
     assert answer.exit_code == 3
     rows = {row["name"]: row for row in json.loads(answer.output)["parameters"]}
-    assert [name for name, row in rows.items() if not row["fine"]] == ["GUID_OPTIONS", "SCR_ENABLE", "SCR_USER1"]
+    assert [name for name, row in rows.items() if not row["fine"]] == ["GUID_OPTIONS", "SCR_ENABLE"]
     assert (rows["GUID_OPTIONS"]["wanted"], rows["GUID_OPTIONS"]["is"]) == ("without 64", 64.0)
 
 

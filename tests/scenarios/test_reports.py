@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 
 from companion.app import Companion, Status
 from companion.cli.commands import app
+from companion.core.extras import not_installed
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
 from companion.replay.replay import Observers, replay
@@ -245,7 +246,7 @@ def test_without_the_extra_one_line_says_how_to_install_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "mcap", None)
     result = CliRunner().invoke(app, ["report", str(record), "--mcap", str(tmp_path / "r.mcap")])
-    assert (result.exit_code, result.output) == (2, "--mcap: mcap is not installed; install rover-companion[mcap]\n")
+    assert (result.exit_code, result.output) == (2, not_installed("--mcap", "mcap", "mcap") + "\n")
     assert not (tmp_path / "r.mcap").exists()
 
 

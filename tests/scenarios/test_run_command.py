@@ -16,6 +16,7 @@ from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
 from companion.recording.reader import load_record
 from companion.replay.replay import replay
+from companion.safety.reasons import EndReason
 from tests.support.quick import first_of
 from tests.support.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, yard
 from tests.support.served import PATIENCE_S, Stopwatch, finished, mission_path, process, served, wait_until
@@ -152,6 +153,9 @@ def test_a_signal_while_driving_stops_the_rover(tmp_path: Path, number: signal.S
     assert seen.contains(seen.cell_at(NedPoint(0.0, 0.0))) and 1 < seen.width < 24
     again = replay(load_record(record))
     assert again.differences == [] and again.companion is not None and again.companion.done
+    end = again.companion.mission_run.end
+    by_user = EndReason.STOPPED_BY_USER if number == signal.SIGINT else EndReason.TERMINATED
+    assert end is not None and end.kind is load_record(record).meta.end_reason is by_user
 
 
 @pytest.mark.slow

@@ -31,13 +31,17 @@ def nobody() -> str:
         return f"tcp:127.0.0.1:{closed.getsockname()[1]}"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_terminal_is_given_back_with_the_last_picture(tmp_path: Path, nobody: str, number: signal.Signals) -> None:
+@pytest.mark.parametrize(
+    ("number", "why"), [(signal.SIGINT, "stopped by the user"), (signal.SIGTERM, "told to end by a signal")]
+)
+def test_the_terminal_is_given_back_with_the_last_picture(
+    tmp_path: Path, nobody: str, number: signal.Signals, why: str
+) -> None:
     with on_a_terminal("companion", *arguments(tmp_path, yard(tmp_path), nobody)) as drawn:
         assert drawn.read_until(b"the autopilot's heartbeat")
         assert ended(drawn, number) == 130
     text = drawn.last.decode()
-    assert text.index("stopped by the user") < text.index("gate: pending") and "Traceback" not in text
+    assert text.index(why) < text.index("gate: pending") and "Traceback" not in text
 
 
 def test_without_a_terminal_the_run_is_told_in_lines(tmp_path: Path) -> None:

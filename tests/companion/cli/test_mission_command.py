@@ -149,24 +149,31 @@ def test_run_warns_in_the_same_words_before_it_opens_the_link(tmp_path: Path) ->
 def test_it_says_how_large_fields_become_and_which_gaps_that_opens(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_text("[[target]]\nnorth_m = 30\neast_m = 0\n")
-    beams = "with single beams alone of 1 m, for 2.4 m"
-    told = f"grid: fields of 0.15 m (by the rover's size), for gaps of 1.0 m or more; {beams}, laid round"
-    assert told in checked(path)
+    laid = "laid round home, targets and fences with a margin of 25 m (half its extent if that is more)"
+    gaps = "the rover drives through gaps of 1.0 m or more, with single beams alone (fields of 1 m) of 2.4 m"
+    assert f"grid: fields of 0.15 m (by the rover's size), {laid}; {gaps}\n" in checked(path)
     path.write_text("[[target]]\nnorth_m = 300\neast_m = 0\n")
-    assert "no more than 250000; for narrower gaps give [grid] resolution_m or a smaller margin_m" in checked(path)
+    finer = checked(path)
+    assert "and no more than 250000 of them), laid round" in finer
+    assert "; for narrower gaps give [grid] resolution_m or a smaller margin_m\n" in finer
     path.write_text('[[target]]\nnorth_m = 30\neast_m = 0\n[sitl]\nsensors = "beams"\n')
-    assert "fields of 1 m (as single beams need), for gaps of 2.4 m or more, laid round" in checked(path)
+    beams = checked(path)
+    assert "fields of 1 m (as single beams need), laid round" in beams and "through gaps of 2.4 m or more\n" in beams
     path.write_text("[rover]\nturning_radius_m = 2\n[[target]]\nnorth_m = 30\neast_m = 0\n")
-    assert "fields of 0.25 m (by the rover's size), for gaps of 1.2 m or more;" in checked(path)
+    arcs = checked(path)
+    assert "fields of 0.25 m (by the rover's size), laid" in arcs and "gaps of 1.2 m or more, with single" in arcs
 
 
 def test_it_checks_with_the_settings_that_the_mission_is_to_be_driven_with(tmp_path: Path) -> None:
     mission, settings = tmp_path / "m.toml", tmp_path / "faster.toml"
     mission.write_text("[rover]\nlength_m = 1.2\nwidth_m = 0.6\n[[target]]\nnorth_m = 30\neast_m = 0\n")
     settings.write_text('[guidance]\ncontroller = "motion-ga"\n')
-    assert "gaps of 1.9 m or more; with single beams" in checked(mission) and "in --settings" in checked(mission)
+    assert "gaps of 1.9 m or more, with single beams" in checked(mission) and "in --settings" in checked(mission)
     planned = checked(mission, "--settings", str(settings))
-    assert "gaps of 0.8 m or more; with single beams alone of 1 m, for 3.0 m" in planned and "--settings" not in planned
+    assert (
+        "gaps of 0.8 m or more, with single beams alone (fields of 1 m) of 3.0 m" in planned
+        and "--settings" not in planned
+    )
     mission.write_text(mission.read_text() + '[sitl]\nsensors = "beams"\n')
     assert "fields of 1 m (as single beams need)" in checked(mission, "--settings", str(settings))
     nowhere = CliRunner().invoke(app, ["mission", "check", str(mission), "--settings", str(tmp_path / "no.toml")])
@@ -185,11 +192,14 @@ def test_with_fields_of_a_given_size_the_gaps_are_those_of_the_map_as_it_is_laid
     mission.write_text(f"{rover}[grid]\nresolution_m = {side_m}\n{target}")
     evidence = map_at_start(load_mission(mission), load_settings(faster), GeoPoint(0.0, 0.0), narrow_sight=False)
     gap_m = open_gap_m(load_mission(mission).rover, evidence)
-    told = f"fields of {side_m:g} m, for gaps of {gap_m:.1f} m or more"
-    assert told in checked(mission, "--settings", str(faster))
+    told = checked(mission, "--settings", str(faster))
+    assert (
+        f"fields of {side_m:g} m, laid" in told and f"; the rover drives through gaps of {gap_m:.1f} m or more" in told
+    )
     place = "lat_deg = 53.1\nlon_deg = 23.2\n"
     mission.write_text(f"{rover}[grid]\nresolution_m = {side_m}\n[[target]]\n{place}")
-    assert f"fields of {side_m:g} m, for gaps of " in checked(mission, "--settings", str(faster))
+    elsewhere = checked(mission, "--settings", str(faster))
+    assert f"fields of {side_m:g} m, laid" in elsewhere and "; the rover drives through gaps of " in elsewhere
 
 
 @pytest.mark.parametrize(
@@ -206,7 +216,7 @@ def test_it_says_the_outline_by_which_a_slip_in_its_keys_is_seen(tmp_path: Path,
 
 def test_options_say_what_a_ground_stations_file_cannot() -> None:
     output = checked(MISSIONS / "field.plan", "--resolution-m", "0.5", "--radius-m", "0.6", "--speed", "1.5")
-    assert "fields of 0.5 m, for gaps of 2.2 m or more, laid round" in output
+    assert "fields of 0.5 m, laid round" in output and "; the rover drives through gaps of 2.2 m or more\n" in output
     assert "rover: radius 0.6 m, cruises at 1.5 m/s" in output
     toml = MISSIONS / "rooms.toml"
     result = CliRunner().invoke(app, ["mission", "check", str(toml), "--radius-m", "0.6"])

@@ -40,7 +40,8 @@ WELL_SET = {
     "WP_JERK": 3.0, "PRX1_TYPE": 0.0, "RNGFND1_TYPE": 0.0, "FS_GCS_ENABLE": 1.0, "FENCE_ENABLE": 0.0,
     "ATC_ACCEL_MAX": 1.0, "ATC_DECEL_MAX": 0.0, "ATC_STR_ACC_MAX": 120.0, "ATC_STR_RAT_MAX": 120.0, "CRUISE_SPEED": 2.0,
     "CRUISE_THROTTLE": 50.0, "FS_ACTION": 2.0, "FS_EKF_ACTION": 1.0,
-    "MAV_GCS_SYSID": 255.0, "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0,
+    "MAV_GCS_SYSID": 255.0, "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0, "SCR_ENABLE": 1.0,
+    "SCR_USER1": 300.0,
 }  # fmt: skip
 WELL = Survey(
     place="memory",
@@ -94,7 +95,10 @@ CASES: list[tuple[str, Level, Survey]] = [
     ("cruise-throttle", W, with_set(CRUISE_SPEED=3.0, CRUISE_THROTTLE=25.0)),
     ("cruise-throttle", W, with_set(CRUISE_SPEED=1.0, CRUISE_THROTTLE=75.0)),
     ("cruise-throttle", W, with_set(CRUISE_SPEED=3.0, CRUISE_THROTTLE=0.0)),
-    ("guard", N, with_state(guard=None)),
+    ("guard", N, replace(without("SCR_ENABLE", "SCR_USER1"), vehicle=replace(WELL.vehicle, guard=None))),
+    ("guard", N, replace(with_set(SCR_ENABLE=0.0, SCR_USER1=0.0), vehicle=replace(WELL.vehicle, guard=None))),
+    ("guard", W, replace(with_set(SCR_ENABLE=0.0), vehicle=replace(WELL.vehicle, guard=None))),
+    ("guard", W, with_state(guard=None)),
     ("late-guard", N, with_state(guard=GuardSeen(0.0, 1.0, False))),
     ("port-shared", S, replace(WELL, rivals=("cat (process 7)",), bad_bytes=900, read_bytes=1000)),
     ("port-damaged", W, replace(WELL, bad_bytes=60, read_bytes=1000)),
@@ -257,6 +261,15 @@ def test_a_fix_that_is_worse_than_asked_for_or_not_told_would_stop_a_mission(
     found = diagnose(replace(WELL, vehicle=replace(WELL.vehicle, gps=seen)), gps_fix)
     assert [(one.name, one.level) for one in found] == ([("gps-fix", Level.STOP)] if stops else [])
     assert all(one.remedy and gps_fix in one.says for one in found)
+
+
+@pytest.mark.parametrize(
+    ("scripts", "remedy"), [(0.0, "set SCR_ENABLE to 1"), (1.0, "upload it with `rover-companion guard --install`")]
+)
+def test_where_a_guard_is_meant_it_is_said_why_there_may_be_none(scripts: float, remedy: str) -> None:
+    seen = replace(with_set(SCR_ENABLE=scripts), vehicle=replace(WELL.vehicle, guard=None))
+    (found,) = diagnose(seen)
+    assert found.says.startswith("SCR_USER1 is set for a guard, but") and found.remedy.startswith(remedy)
 
 
 @pytest.mark.parametrize(("waits_s", "late"), [(0.95, False), (0.951, True)])

@@ -12,7 +12,7 @@ from companion.core.grid import Cell, empty_grid
 from companion.navigation.field_step import NavState
 from companion.planning.problem import Path
 from companion.planning.raster import CellArray
-from companion.replay.explain import Candidate, _rest_of_path, _Scene, cost_of, cost_text, motion_lines
+from companion.replay.explain import Candidate, _rest_of_path, _Scene, cost_of, cost_text, map_line, motion_lines
 from tests.companion.control.test_motion_controller import controller, view
 from tests.companion.control.test_motion_ground import PATH, ground
 
@@ -52,6 +52,22 @@ def test_what_is_left_of_a_path_begins_where_the_rover_is_and_costs_what_the_nav
     rest = _rest_of_path(scene)
     assert rest.path is not None and rest.path.cells == tuple(Cell(x, 0) for x in range(here.x, 5)) and here.x > 0
     assert rest.cost == cost_of(grid, rest.path.cell_array) < path.cost and rest.note == "clear"
+
+
+@pytest.mark.parametrize(
+    ("open_fields", "seen", "says"),
+    [
+        (400, 1, "1 are seen (less than 1%), 0 are barred by obstacles"),
+        (400, 300, "300 are seen (75%), 0 are barred by obstacles"),
+        (241_600, 241_600, "241600 are seen (100%), 0 are barred by obstacles"),
+        (400, 0, "0 are seen (0%), 0 are barred by obstacles"),
+    ],
+)
+def test_what_a_fence_closes_does_not_count_as_unseen_or_as_an_obstacle(open_fields: int, seen: int, says: str) -> None:
+    """Inside a wide keep-in area it said that 0 % were seen, and that all beyond it were obstacles."""
+    closed = np.arange(241_600) >= open_fields
+    shut = "241200 closed by fences or a given map; of the other 400, " if closed.any() else ""
+    assert map_line(closed, closed, (np.arange(241_600) < seen) | closed) == shut + says
 
 
 @pytest.mark.parametrize("shut_in", [True, False])

@@ -110,6 +110,7 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (PowerReason.CRITICAL, ("battery",), "battery critical for the autopilot"),
     (EndReason.DONE, (), "done"),
     (EndReason.STOPPED_BY_USER, (), "stopped by the user"),
+    (EndReason.TERMINATED, (), "told to end by a signal"),
     (EndReason.NOBODY_HERE, (), "nobody is here to do what the companion waits for"),
     (EndReason.NEVER_BEGINS, ("connecting",), "connecting since the start; it cannot be expected any more"),
     (EndReason.TIME_LIMIT, (), "time limit reached"),

@@ -57,15 +57,15 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        ("[[wheel]]\nradius_m = 1.0\n[[wheel]]\n", "wheel 2.radius_m: field required, it is missing; see the manual"),
-        ("[[wheel]]\nradius = 1.0", "wheel 1.radius_m: field required, it is missing"),
-        ("[[wheel]]\nradius_m = 'a'", "wheel 1.radius_m: input should be a valid number (got 'a'); see"),
+        ("[[wheel]]\nradius_m = 1.0\n[[wheel]]\n", "wheel 2.radius_m: is missing, and must be given; see the manual"),
+        ("[[wheel]]\nradius = 1.0", "wheel 1.radius_m: is missing, and must be given"),
+        ("[[wheel]]\nradius_m = 'a'", "wheel 1.radius_m: must be a number (got 'a'); see"),
         (
             "[[wheel]]\nradius_m = '0,3'",
-            "wheel 1.radius_m: input should be a valid number (got '0,3'); write 0.3 without",
+            "wheel 1.radius_m: must be a number (got '0,3'); write 0.3 without",
         ),
         ("[wheel]\nradius_m = 1.0", "wheel: one table where several may stand; write [[wheel]] with double brackets"),
-        ("\ufeffname = 1", "name: input should be a valid string"),
+        ("\ufeffname = 1", "name: must be a text in quotes"),
         ("nam = 'a'", "nam: unknown key, did you mean 'name'?; see the manual"),
         ('"a\\nb" = 1', "a\\nb: unknown key; known here: name, load_kg, wheel"),
     ],

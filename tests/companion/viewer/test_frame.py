@@ -110,9 +110,9 @@ BLIND = Reason(WaitReason.GOOD_DATA_AND, (Reason(Doubt.DATA_OLD, ("range data", 
 BLINDED = Activity(RunPhase.STOPPED_AND_WAITING, NOT_OURS, BLIND)
 WAITING = Activity(RunPhase.WAITING, awaited=Reason(WaitReason.ARMING))
 DOUBTED = Activity(RunPhase.STOPPED, Reason(Doubt.POSITION_WANDERS))
-DONE, BY_USER, NOBODY = (
+DONE, BY_USER, BY_SIGNAL, NOBODY = (
     Activity(RunPhase.ENDED, Reason(kind))
-    for kind in (EndReason.DONE, EndReason.STOPPED_BY_USER, EndReason.NOBODY_HERE)
+    for kind in (EndReason.DONE, EndReason.STOPPED_BY_USER, EndReason.TERMINATED, EndReason.NOBODY_HERE)
 )
 LOW = Reason(PowerReason.LOW, ("battery",))
 STILL_ARMED = Reason(Parting.ARMED, ("HOLD",))
@@ -186,6 +186,12 @@ HELD_FOR = "it had stopped: autopilot silent for over 24 s (the companion asked 
         ),
         (NOBODY, {"before": WAITING}, "ended, nobody is here", f"it waited for {WAITING.awaited}"),
         (BY_USER, {"shed": TargetStatus.PENDING}, "stopped by the user: 1 of 2 targets reached", "shed: not reached"),
+        (
+            BY_SIGNAL,
+            {"shed": TargetStatus.PENDING},
+            "told to end by a signal: 1 of 2 targets reached",
+            "shed: not reached",
+        ),
     ],
 )
 def test_the_line_says_what_the_rover_does_and_why_it_stands(

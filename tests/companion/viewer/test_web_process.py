@@ -383,8 +383,9 @@ def test_without_the_extra_it_says_what_to_install(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("companion.viewer.web_process.find_spec", lambda name: name if name in there else None)
     with pytest.raises(WebError) as caught:
         web_place("8000", None)
-    remedy = "install rover-companion[web] (in the project's folder: .venv/bin/pip install -e '.[web]')"
-    assert str(caught.value) == f"--web: {says} installed; {remedy}"
+    them = "them" if " are " in says else "it"
+    remedy = "pip install 'rover-companion[web]' (in the project's folder: .venv/bin/pip install -e '.[web]')"
+    assert str(caught.value) == f"--web: {says} installed; install {them}: {remedy}"
 
 
 def test_a_port_that_is_taken_is_told_at_once() -> None:

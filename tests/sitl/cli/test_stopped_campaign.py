@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -47,6 +48,13 @@ def test_what_is_done_is_reported_with_how_many_of_how_many(
     assert "2 of 5 runs, seeds 0 to 4. <b>Not all runs are done: 3 are left.</b>" in report
     assert len((out / "runs.csv").read_text().splitlines()) == 3
     assert "c: 2 of 5 runs" in capsys.readouterr().out
+    monkeypatch.setattr(command, "driven_here", Drives(1))
+    with pytest.raises(StoppedError, match="3 of 5 runs, kept in"):
+        command.drive_campaign(file, out, 1)
+    told = capsys.readouterr()
+    assert "c: 3 of 5 runs" in told.out
+    counted = re.findall(r"\d+ of \d+ runs", told.err)
+    assert counted == ["2 of 5 runs", "3 of 5 runs"], "what is there, and how far it came: all count the whole campaign"
     monkeypatch.setattr(command, "driven_here", Drives(5))
     assert len(command.drive_campaign(file, out, 1)) == 5
     report = (out / "report.html").read_text()

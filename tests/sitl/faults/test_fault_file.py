@@ -102,20 +102,20 @@ def test_what_is_said_is_understood(tmp_path: Path) -> None:
 
 BAD = [
     ("", "fault: there is none; write"),
-    ("fault = 3\n", "fault: input should be a list in [brackets]"),
+    ("fault = 3\n", "fault: must be a list in [brackets]"),
     ("[[faults]]\n", "faults: unknown key, did you mean 'fault'?"),
     ('[[fault]]\nkind = "packet_los"\nstart_s = 1\n', "unknown kind 'packet_los', did you mean 'packet_loss'?"),
     ("[[fault]]\nstart_s = 1\n", "fault 1: kind: missing; kinds are packet_loss, "),
-    ('[[fault]]\nkind = "gps_loss"\n', "fault 1 (gps_loss): start_s: field required"),
+    ('[[fault]]\nkind = "gps_loss"\n', "fault 1 (gps_loss): start_s: is missing"),
     (
         '[[fault]]\nkind = "gps_loss"\nstart_s = 1\n[[fault]]\nkind = "packet_loss"\nstart_s = 1\n',
         "fault 2 (packet_loss)",
     ),
-    ('[[fault]]\nkind = "packet_loss"\nstart_s = 1\nprobability = 1.5\n', "less than or equal to 1"),
+    ('[[fault]]\nkind = "packet_loss"\nstart_s = 1\nprobability = 1.5\n', "must be 1 or less"),
     ('[[fault]]\nkind = "packet_loss"\nstart_s = 1\nprobability = nan\n', "probability"),
     ('[[fault]]\nkind = "gps_noise"\nstart_s = 1\nmetres = 1\ntime = 3\n', "unknown key, did you mean 'time_s'?"),
-    ('[[fault]]\nkind = "gps_loss"\nstart_s = -1\n', "greater than or equal to 0"),
-    ('[[fault]]\nkind = "gps_loss"\nstart_s = "soon"\n', "valid number"),
+    ('[[fault]]\nkind = "gps_loss"\nstart_s = -1\n', "must be 0 or more"),
+    ('[[fault]]\nkind = "gps_loss"\nstart_s = "soon"\n', "must be a number"),
     ('[[fault]]\nkind = "gps_loss"\nstart_s = 5\nend_s = 5\n', "end_s 5 is not after start_s 5; choose a later end_s"),
     ('[[fault]]\nkind = "gps_loss"\nstart_s = 5\nend_s = 9\nduration_s = 4\n', "use one of them"),
     ('[[fault]]\nkind = "gps_loss"\nstart_s = 5\nduration_s = 4\nrepeat_s = 4\n', "repeat_s must be longer"),
@@ -125,7 +125,7 @@ BAD = [
     ('[[fault]]\nkind = "packet_loss"\nstart_s = 1\nprobability = 1\nlinks = [0]\n', "links.0"),
     (
         "seed = -1\n[[fault]]\nkind = 'gps_loss'\nstart_s = 1\n",
-        "seed: input should be greater than or equal to 0 (got -1); docs/",
+        "seed: must be 0 or more (got -1); docs/",
     ),
     ("[[fault]\n", "not valid TOML"),
 ]

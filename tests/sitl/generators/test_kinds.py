@@ -116,7 +116,7 @@ def test_the_command_writes_a_mission_that_is_driven_in_that_world(tmp_path: Pat
         (["maze", "--set", "corridor_m"], "give a parameter as NAME=VALUE, like corridor_m=3"),
         (["maze", "--set", "corridor_m=2", "--set", "corridor_m=3"], "--set corridor_m=3: corridor_m is given twice"),
         (["maze", "--set", "corridor=3"], "did you mean 'corridor_m'"),
-        (["maze", "--set", "corridor_m=0.5"], "maze: corridor_m: input should be greater than or equal to 1.6"),
+        (["maze", "--set", "corridor_m=0.5"], "maze: corridor_m: must be 1.6 or more"),
         (["maze", "--image", "maze"], "the name says no picture format"),
     ],
 )

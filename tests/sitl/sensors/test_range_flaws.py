@@ -254,7 +254,7 @@ BAD = [
     ("[[beam]]\norientation = 0\nmin_m = 0.1\nmax_m = 5.0\ndropouts = 0.1\n", "did you mean 'dropout'"),
     ("[proximity]\nsectors = [8]\nmin_m = 0.1\nmax_m = 5.0\n", "proximity.sectors"),
     ("[proximity]\nmin_m = 0.1\nmax_m = 5.0\nfalse_echo = 2.0\n", "proximity.false_echo"),
-    ("[proximity]\nmin_m = 0.1\nmax_m = 5.0\nsun = { bearing_deg = 3.0 }\n", "sun.range_share: field required"),
+    ("[proximity]\nmin_m = 0.1\nmax_m = 5.0\nsun = { bearing_deg = 3.0 }\n", "sun.range_share: is missing"),
     ("sonar = 3\n", "unknown key"),
     ("[lidar\n", "not valid TOML"),
 ]

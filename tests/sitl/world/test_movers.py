@@ -137,7 +137,7 @@ def test_nobody_talks_where_nothing_announces_itself() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("speed_m_s = 1.0\nroute_m = [[0, 9], [5, 9]]", "sitl.movers 1.radius_m: field required"),
+        ("speed_m_s = 1.0\nroute_m = [[0, 9], [5, 9]]", "sitl.movers 1.radius_m: is missing"),
         ("radius_m = 0.0\nspeed_m_s = 1.0\nroute_m = [[0, 9], [5, 9]]", "sitl.movers 1.radius_m"),
         ("radius_m = 0.5\nspeed_m_s = -1.0\nroute_m = [[0, 9], [5, 9]]", "sitl.movers 1.speed_m_s"),
         (

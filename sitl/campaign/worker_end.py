@@ -1,0 +1,23 @@
+"""A process of ``--jobs`` ends with the one that began it, however that ended: ``kill -9`` lets nobody say a word."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from threading import Event, Thread
+
+LOOK_S = 1.0
+
+
+@cache
+def end_with(parent: int) -> None:
+    """Once in each worker. ``parent``: the process that began it; without effect in that process itself."""
+    if os.getpid() != parent:
+        Thread(target=_watch, args=(parent,), daemon=True).start()
+
+
+def _watch(parent: int) -> None:
+    never = Event()
+    while os.getppid() == parent:
+        never.wait(LOOK_S)
+    os._exit(1)  # nobody is left to be told anything
