@@ -24,6 +24,7 @@ WHAT_NEXT = (
     "set SCR_ENABLE to 1 and SCR_USER1 to 300 (milliseconds), and restart the autopilot; then `rover-companion doctor` "
     "shows whether it is there"
 )
+GONE = "; the script that was there may be gone: install it again before you restart the autopilot"
 BY_HAND = "copy it to the folder APM/scripts of the autopilot's SD card (`rover-companion guard --write FILE`)"
 
 
@@ -73,6 +74,10 @@ def _upload(place: str, settings: LinkSettings, data: bytes) -> None:
             upload.step(now_s)
             clock.sleep_until_s(now_s + STEP_S)
             now_s = clock.now_s()
+    except KeyboardInterrupt:
+        if upload.removed:
+            typer.echo(f"{place}: stopped{GONE}", err=True)
+        raise
     finally:
         link.close()
     if upload.end is UploadEnd.DONE:
@@ -82,6 +87,5 @@ def _upload(place: str, settings: LinkSettings, data: bytes) -> None:
         UploadEnd.NO_ROVER: "check link and port",
         UploadEnd.ARMED: "disarm it first",
     }.get(upload.end, BY_HAND)
-    lost = "; the script that was there may be gone: install it again before you restart the autopilot"
-    typer.echo(f"{place}: {upload.end}; {remedy}{lost if upload.removed else ''}", err=True)
+    typer.echo(f"{place}: {upload.end}; {remedy}{GONE if upload.removed else ''}", err=True)
     raise typer.Exit(EXIT_NOBODY if upload.end is UploadEnd.NO_ROVER else EXIT_NOT_THERE)

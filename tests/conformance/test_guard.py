@@ -149,6 +149,41 @@ def test_a_companion_that_falls_silent_while_it_drives_is_followed_by_hold(guard
     assert guard.mode == Mode.HOLD
 
 
+def test_hold_that_is_refused_is_asked_for_again_and_is_not_called_the_guards_doing() -> None:
+    there = Script()
+    there.put(Mode.GUIDED, True)
+    there.lua.execute(b"accepts = false vehicle.set_mode = function(_, new) if accepts then mode = new end "
+                       b"return accepts end")  # fmt: skip
+    looks(there, 0.5, 0.1, packed(SETPOINT))
+    looks(there, 1.5)
+    assert there.mode == Mode.GUIDED and there.told_ms == 300.0
+    there.lua.execute(b"accepts = true")
+    looks(there, 0.02)
+    assert there.mode == Mode.HOLD
+    looks(there, 0.6)
+    assert there.told_ms == -300.0
+
+
+def test_it_asks_for_a_queue_with_room_for_all_that_it_listens_to() -> None:
+    """``mavlink:init`` takes the queue's length and how many message ids may be registered."""
+    asked, there = list[tuple[int, int]](), Script()
+    there.values[b"mavlink"][b"init"] = lambda _, queue, ids: asked.append((queue, ids))
+    there.lua.execute(script().encode())
+    ((queue, ids),) = asked
+    assert queue >= 10 and ids == len(list(there.values[b"wanted"].keys()))
+
+
+def test_an_older_autopilot_has_another_name_for_its_id() -> None:
+    there = Script()
+    there.values[b"parameters"][b"MAV_SYSID"] = None
+    there.values[b"parameters"][b"SYSID_THISMAV"] = 1
+    there._update = there.lua.execute(script().encode())[0]
+    there.put(Mode.GUIDED, True)
+    looks(there, 0.5, 0.1, packed(SETPOINT))
+    looks(there, 0.4)
+    assert there.mode == Mode.HOLD
+
+
 def test_heartbeats_are_a_sign_of_life_and_packets_of_others_are_not(guard: Guards) -> None:
     guard.hear(packed(SETPOINT))
     looks(guard, 2.0, 0.1)

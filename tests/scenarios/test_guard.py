@@ -112,6 +112,18 @@ def test_an_upload_that_may_have_removed_the_script_says_so(monkeypatch: pytest.
     assert ("may be gone: install it again before you restart" in answer.output) is removed
 
 
+@pytest.mark.parametrize("removed", [True, False])
+def test_an_upload_that_is_stopped_says_so_too(monkeypatch: pytest.MonkeyPatch, removed: bool) -> None:
+    def stopped(now_s: float) -> None:
+        raise KeyboardInterrupt
+
+    upload = SimpleNamespace(end=None, heard=True, removed=removed, step=stopped)
+    monkeypatch.setattr("companion.cli.guard.FileUpload", lambda *_: upload)
+    url = f"udpin:127.0.0.1:{free_port(socket.SOCK_DGRAM)}"
+    answer = CliRunner().invoke(app, ["guard", "--install", url])
+    assert answer.exit_code != 0 and ("stopped; the script that was there may be gone" in answer.output) is removed
+
+
 def test_nobody_there_and_a_place_that_cannot_be_written_are_told_in_a_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -514,6 +514,25 @@ def test_a_rover_that_rolls_the_other_way_though_it_is_told_to_stand_is_told_to_
     assert found == [0.4 * onward, 0.0, 0.0, 0.2 * onward, 0.2 * onward, 0.0]
 
 
+@pytest.mark.parametrize(
+    ("brakes_m_s2", "walled", "told_m_s"), [(2.0, False, 0.2), (2.0, True, 0.0), (4.0, False, 0.0)]
+)
+def test_it_does_not_go_against_it_into_something_nor_where_it_brakes_hard(
+    brakes_m_s2: float, walled: bool, told_m_s: float
+) -> None:
+    """Without a guard that goes on for three seconds: 0.5 m."""
+    evidence, planner = ground(), Wants(0.4)
+    leads, at = MotionController(FOOTPRINT, planner), view(ground(), Pose(5.0, 10.0, 0.0, 0.0), 0.4, STRICT)
+    at = replace(at, following=at.following._replace(deceleration_m_s2=brakes_m_s2))
+    leads.follow(PATH, at)
+    planner.wanted_m_s = 0.0
+    if walled:
+        wall(evidence, 5.6, 8.0, 12.0)
+    rolls = replace(at, pose=replace(at.pose, time_s=0.1), speed_m_s=0.12, rolls_back=True, evidence=evidence)
+    leads.follow(PATH, rolls)
+    assert leads.choice is not None and leads.choice.told.speed_m_s == told_m_s
+
+
 def test_it_foresees_that_it_backs_off() -> None:
     """Before a wall, with the path behind it, it begins tail first or turns: not on towards the wall."""
     evidence = ground()

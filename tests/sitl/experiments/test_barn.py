@@ -278,6 +278,88 @@ class FakeDrive:
         self.truth = replace(self.scenario.start, north_m=self.scenario.start.north_m + went_m)
 
 
+def drive_that_goes(went_m: float, *, touches: bool = False, done: bool = False) -> type[FakeDrive]:
+    """A drive whose rover is so far north after its first tick."""
+
+    class Goes(FakeDrive):
+        def tick(self) -> None:
+            super().tick()
+            self.truth = replace(self.scenario.start, north_m=self.scenario.start.north_m + went_m)
+            self.collisions, self.done = ("a post",) if touches else (), done  # type: ignore[assignment]
+
+    return Goes
+
+
+@pytest.mark.parametrize(
+    ("went_m", "touches", "done", "end", "seconds"),
+    [
+        (9.1, False, False, RunEnd.REACHED, 0.0),
+        (8.9, False, False, RunEnd.TIMEOUT, 100.0),
+        (8.9, False, True, RunEnd.TIMEOUT, 0.0),
+        (5.0, True, False, RunEnd.CONTACT, 0.0),
+        (9.1, True, True, RunEnd.CONTACT, 0.0),
+    ],
+)
+def test_a_run_ends_at_a_contact_within_1_m_of_the_goal_or_when_nobody_drives_on(
+    monkeypatch: pytest.MonkeyPatch, went_m: float, touches: bool, done: bool, end: RunEnd, seconds: float
+) -> None:
+    """A contact counts though the goal was reached in the same tick."""
+    monkeypatch.setattr(barn, "Drive", drive_that_goes(went_m, touches=touches, done=done))
+    one = drive(made_world(3), "motion-ga", 0)
+    assert one.end is end and one.seconds == pytest.approx(seconds, abs=0.1)
+
+
+def test_each_world_and_seed_has_a_rover_of_its_own_and_the_companion_is_not_told_which(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(barn, "Drive", drive_that_goes(9.1))
+    monkeypatch.setattr(FakeDrive, "asked", [])
+    for world, seed, off in ((3, 0, 0.3), (3, 0, 0.3), (3, 1, 0.3), (4, 0, 0.3), (3, 0, 0.0)):
+        drive(made_world(world), "motion-ga", seed, off=off)
+    same, again, other_seed, other_world, exact = (one.scenario.drivetrain for one in FakeDrive.asked)
+    assert same == again and len({same, other_seed, other_world, exact}) == 4 and exact == SIM_ROVER
+    assert {one.settings.motion for one in FakeDrive.asked} == {FakeDrive.asked[0].settings.motion}
+
+
+@pytest.mark.parametrize(
+    ("setup", "controller", "guarded", "gains_m_s2"),
+    [
+        (Setup.GUARDED, "motion-ga", True, 1.0),
+        (Setup.STRICT, "motion-ga", False, 1.0),
+        (Setup.JACKAL, "motion-ga", True, 20.0),
+        (Setup.GUARDED, "points", False, 1.0),
+    ],
+)
+def test_a_setup_says_whether_there_is_a_guard_and_what_the_rover_is_taken_for(
+    monkeypatch: pytest.MonkeyPatch, setup: Setup, controller: str, guarded: bool, gains_m_s2: float
+) -> None:
+    monkeypatch.setattr(barn, "Drive", drive_that_goes(9.1))
+    monkeypatch.setattr(FakeDrive, "asked", [])
+    drive(made_world(3), controller, 0, setup)
+    (asked,) = FakeDrive.asked
+    assert (asked.scenario.parameters.get("SCR_ENABLE") == 1.0) is guarded
+    motion = asked.settings.motion
+    assert motion.acceleration_m_s2 == motion.deceleration_m_s2 == gains_m_s2
+
+
+def test_the_page_counts_ends_and_shows_the_best_controller() -> None:
+    """Two of four arrive: one in 2.4, one in 6 times the optimal time; one of each other end."""
+
+    def one(controller: str, world: int, end: RunEnd, seconds: float) -> BarnRun:
+        return BarnRun(controller, Setup.GUARDED, world, 0, end, seconds, 5.0, np.zeros((1, 2)))
+
+    ends = [(RunEnd.REACHED, 12.0), (RunEnd.REACHED, 30.0), (RunEnd.TIMEOUT, 100.0), (RunEnd.TIMEOUT, 100.0)]
+    good = tuple(one("motion-ga", world, *end) for world, end in enumerate(ends))
+    bad = (one("dwa", 0, RunEnd.CONTACT, 1.0),)
+    report = BarnReport(
+        Options(1), numbered(range(4)), {(Setup.GUARDED, "motion-ga"): good, (Setup.GUARDED, "dwa"): bad}
+    )
+    (found, touched) = report._rows(Setup.GUARDED, plain=True)
+    assert found == ["motion-ga", "4", "0.500", "0.000", "0.500", "0.146", "0.104", "4.200"]
+    assert touched[2:] == ["0.000", "1.000", "0.000", "0.000", "0.000", "-"]
+    assert report._best() == (Setup.GUARDED, "motion-ga")
+
+
 @pytest.mark.parametrize("setup", list(Setup))
 def test_a_run_has_the_rover_the_lidar_and_the_limits_of_the_challenge(
     monkeypatch: pytest.MonkeyPatch, setup: Setup
