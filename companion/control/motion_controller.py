@@ -74,7 +74,9 @@ STANDS_FIRST_M_S = 0.1
 integral is full from braking and is emptied only where the rover is told to stand and has stopped (``ATC_STOP_SPEED``):
 else it rolls on, or back, for seconds, told to stand, at 0.2 m/s (2.2 s to a third)."""
 STOOD_S = 0.2
-"""So long it must have stood then: what the autopilot aims at is zero a little later than the speed."""
+"""With a guard so long it must have stood then: what the autopilot aims at is zero a little later than the speed."""
+STANDS_FIRST_MOST_S = 2.0
+"""It waits no longer for that once it is as slow: on a slope, or by a noisy speed, it may never seem to stand."""
 AGAINST_ROLL_M_S = 0.2
 """A rover that rolls the other way though it is told to stand is told to go against that so fast. One that brakes
 better than ArduRover lets it stands before ArduRover aims at zero, and the integral then drives it back, by itself at
@@ -141,10 +143,12 @@ class MotionController:
         """Whether the rover rolled tail first when it was last led."""
         self._stands_first = False
         """Whether it was told to stand because of that."""
-        self._rolled_s = -math.inf
-        """When it rolled last."""
-        self._onward = 0.0
-        """The sign of the speed that was told last, but for zero."""
+        self._fast_s = -math.inf
+        """When it last rolled faster than ``STANDS_FIRST_M_S``."""
+        self._rolled_s, self._rolled_way = -math.inf, 1.0
+        """When it rolled last, and the sign of its speed then."""
+        self._told_stand_s, self._onward = -math.inf, 1.0
+        """When it was told to stand last, and the sign of its speed when that began."""
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
         """The path itself."""
@@ -202,7 +206,9 @@ class MotionController:
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
         self._time_s = now_s
         if view.speed_m_s > STANDS_M_S:
-            self._rolled_s = now_s
+            self._rolled_s, self._rolled_way = now_s, math.copysign(1.0, view.forward_m_s)
+        if view.speed_m_s > STANDS_FIRST_M_S:
+            self._fast_s = now_s
         self._note_way(view, passed_s)
         problem = self._problem(path, view, model)
         later = problem._replace(
@@ -218,7 +224,6 @@ class MotionController:
         found = self._planner.plan(problem, passed_s)
         told = self._against_roll(self._safe(found.motion[0], view, worst), view, worst)
         self._stands_first = self._is_to_stand(told.speed_m_s, view)
-        self._onward = math.copysign(1.0, told.speed_m_s) if told.speed_m_s else self._onward
         assert self._window is not None
         ahead = self._position.faster_than(told.speed_m_s, path, view)
         self.choice = MotionChoice(now_s, problem, found, told, self._window.corner, ahead)
@@ -266,17 +271,24 @@ class MotionController:
 
     def _is_to_stand(self, speed_m_s: float, view: LocalView) -> bool:
         """Whether it must have stood before it is told this: see ``STANDS_FIRST_M_S``."""
-        onward_m_s, rolls_m_s = math.copysign(speed_m_s, speed_m_s * view.forward_m_s), abs(view.forward_m_s)
+        onward_m_s, rolls_m_s = speed_m_s * self._rolled_way, abs(view.forward_m_s)
         # Without a guard such low speeds are how it gets through gaps: to stand each time took it 4 % longer.
         slowest_m_s = STANDS_FIRST_M_S if _alone_s(view) == 0.0 else 0.0
         if onward_m_s >= slowest_m_s or view.following.deceleration_m_s2 > BRAKES_AT_ONCE_M_S2:
             return False
-        return self._time_s - self._rolled_s < STOOD_S if self._stands_first else rolls_m_s > STANDS_FIRST_M_S
+        if not self._stands_first:
+            return rolls_m_s > STANDS_FIRST_M_S
+        return self._time_s - self._rolled_s < STOOD_S and self._time_s - self._fast_s < STANDS_FIRST_MOST_S
 
     def _against_roll(self, told: ToldVelocity, view: LocalView, worst: Problems) -> ToldVelocity:
         """To go slowly against it where it rolls the other way though it is told to stand: see ``AGAINST_ROLL_M_S``."""
+        if told.speed_m_s:
+            return told
+        if self._time_s - self._told_stand_s > STOOD_S:
+            self._onward = math.copysign(1.0, view.forward_m_s)
+        self._told_stand_s = self._time_s
         rolls_m_s = -self._onward * view.forward_m_s
-        if told.speed_m_s or rolls_m_s <= STANDS_FIRST_M_S or view.following.deceleration_m_s2 > BRAKES_AT_ONCE_M_S2:
+        if rolls_m_s <= STANDS_FIRST_M_S or view.following.deceleration_m_s2 > BRAKES_AT_ONCE_M_S2:
             return told
         against = told._replace(speed_m_s=self._onward * AGAINST_ROLL_M_S)
         return against if _may_be_left_alone(against, view, worst) else told

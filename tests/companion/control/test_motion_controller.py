@@ -15,6 +15,7 @@ from companion.control.following import AS_SHIPPED, Following, turn_gains, withi
 from companion.control.local_view import LocalView
 from companion.control.motion_controller import (
     FASTER_DRAGGED_M_S,
+    STANDS_M_S,
     MotionController,
     _faster_s,
     _latest,
@@ -470,15 +471,32 @@ def test_it_looks_as_far_as_where_the_rover_would_come_to_stand() -> None:
 
 
 @pytest.mark.parametrize("wanted_m_s", [0.4, -0.4])
-def test_a_rover_that_rolls_stands_before_it_is_told_to_go_the_other_way(wanted_m_s: float) -> None:
+@pytest.mark.parametrize(("settings", "waits"), [(GUARDED, True), (STRICT, False)])
+def test_a_rover_that_rolls_stands_before_it_is_told_to_go_the_other_way(
+    wanted_m_s: float, settings: Settings, waits: bool
+) -> None:
     """Else the autopilot's integral, full from braking, would push it on when it is told to stand again."""
-    leads = MotionController(FOOTPRINT, Wants(wanted_m_s))
-    at = replace(view(ground(), Pose(5.0, 10.0, 0.0, 0.0), 0.3), rolls_back=wanted_m_s > 0.0)
-    for time_s, speed_m_s, told_m_s in ((0.0, 0.3, 0.0), (0.1, 0.04, 0.0), (0.25, 0.04, wanted_m_s)):
-        command = leads.follow(PATH, replace(at, pose=replace(at.pose, time_s=time_s), speed_m_s=speed_m_s))
-        assert isinstance(command.setpoint, GuidedVelocity) and command.setpoint.forward_m_s == told_m_s
-    same_way = replace(at, rolls_back=wanted_m_s < 0.0)
-    assert leads.follow(PATH, same_way).purpose is Purpose.DRIVE
+    leads, found = MotionController(FOOTPRINT, Wants(wanted_m_s)), []
+    for time_s, speed_m_s in ((0.0, 0.3), (0.1, 0.12), (0.15, 0.04), (0.2, 0.0), (0.32, 0.0)):
+        at = view(ground(), Pose(5.0, 10.0, 0.0, time_s), speed_m_s, settings)
+        leads.follow(PATH, replace(at, rolls_back=wanted_m_s > 0.0 and speed_m_s > STANDS_M_S))
+        assert leads.choice is not None
+        found.append(leads.choice.told.speed_m_s)
+    then_m_s = 0.0 if waits else found[-1]
+    assert found == [0.0, 0.0, then_m_s, then_m_s, pytest.approx(wanted_m_s, abs=0.3)] and found[-1] * wanted_m_s > 0.0
+    at = replace(view(ground(), Pose(5.0, 10.0, 0.0, 0.4), 0.3, settings), rolls_back=wanted_m_s < 0.0)
+    assert leads.follow(PATH, at).purpose is Purpose.DRIVE
+
+
+@pytest.mark.parametrize("wanted_m_s", [0.4, -0.4])
+def test_a_rover_that_never_seems_to_stand_is_told_to_go_on_after_two_seconds(wanted_m_s: float) -> None:
+    leads, found = MotionController(FOOTPRINT, Wants(wanted_m_s)), []
+    for tick in range(60):
+        at = view(ground(), Pose(5.0, 10.0, 0.0, 0.05 * tick), 0.3 if tick < 10 else 0.07)
+        leads.follow(PATH, replace(at, rolls_back=wanted_m_s > 0.0))
+        assert leads.choice is not None
+        found.append(leads.choice.told.speed_m_s)
+    assert found == [0.0] * 49 + [wanted_m_s] * 11
 
 
 @pytest.mark.parametrize(("settings", "told_m_s"), [(GUARDED, [0.0, 0.0, 0.0, 0.06, 0.06]), (STRICT, [0.06] * 5)])
@@ -526,11 +544,24 @@ def test_it_does_not_go_against_it_into_something_nor_where_it_brakes_hard(
     at = replace(at, following=at.following._replace(deceleration_m_s2=brakes_m_s2))
     leads.follow(PATH, at)
     planner.wanted_m_s = 0.0
+    leads.follow(PATH, replace(at, pose=replace(at.pose, time_s=0.05)))
     if walled:
         wall(evidence, 5.6, 8.0, 12.0)
     rolls = replace(at, pose=replace(at.pose, time_s=0.1), speed_m_s=0.12, rolls_back=True, evidence=evidence)
     leads.follow(PATH, rolls)
     assert leads.choice is not None and leads.choice.told.speed_m_s == told_m_s
+
+
+def test_what_it_rolled_before_others_led_it_is_no_roll_to_go_against() -> None:
+    """Told to go back once, and then driven ahead by a pilot or while it makes way: it is only to stand."""
+    planner = Wants(-0.4)
+    leads = MotionController(FOOTPRINT, planner)
+    leads.follow(PATH, replace(view(ground(), Pose(5.0, 10.0, 0.0, 0.0), 0.3), rolls_back=True))
+    planner.wanted_m_s = 0.0
+    leads.follow(PATH, view(ground(), Pose(5.0, 10.0, 0.0, 0.1), 0.0))
+    for time_s in (5.0, 5.05, 5.1):
+        command = leads.follow(PATH, view(ground(), Pose(5.0, 10.0, 0.0, time_s), 1.2))
+        assert command.purpose is Purpose.BRAKE and command.setpoint == GuidedVelocity(0.0, 0.0)
 
 
 def test_it_foresees_that_it_backs_off() -> None:
