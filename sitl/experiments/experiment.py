@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from rich.table import Table
 
+from companion.core.extras import not_installed
 from companion.core.grid import Cell, Grid
 from companion.core.own_parts import OwnKind, OwnPartError, looks_own
 from companion.executive.controller_choice import check_controller
@@ -201,9 +202,7 @@ def each(
         from joblib import Memory, Parallel, delayed
     except ImportError as error:
         option = f"--jobs {jobs}" if keep is None else f"--keep {keep}"
-        raise ExperimentError(
-            f"{option}: joblib is not installed; install rover-companion[experiments], or leave the option out"
-        ) from error
+        raise ExperimentError(not_installed(option, "experiments", "joblib")) from error
     do = work if keep is None else Memory(keep / code_digest(), verbose=0).cache(work)
     made: Iterator[Result] = Parallel(n_jobs=jobs, return_as="generator")(delayed(do)(*task) for task in tasks)
     return made
