@@ -18,8 +18,8 @@ from sitl.campaign.campaign_file import CampaignError
 from sitl.campaign.drive_run import drive
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests
-from sitl.campaign.worker_end import end_with
 from sitl.campaign.worker_start import begin
+from sitl.worker_end import end_with
 
 Done = Iterator[tuple[RunSpec, RunResult]]
 RETRIES = 3

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import platform
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
@@ -29,6 +30,7 @@ from companion.storage.files import why_no_file
 from companion.storage.shipped import SOURCE, shipped
 from sitl.experiments import drawing
 from sitl.experiments.results_page import write_section
+from sitl.worker_end import end_with
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -204,8 +206,17 @@ def each(
         option = f"--jobs {jobs}" if keep is None else f"--keep {keep}"
         raise ExperimentError(not_installed(option, "experiments", "joblib")) from error
     do = work if keep is None else Memory(keep / code_digest(), verbose=0).cache(work)
-    made: Iterator[Result] = Parallel(n_jobs=jobs, return_as="generator")(delayed(do)(*task) for task in tasks)
+    parent = os.getpid()
+    made: Iterator[Result] = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(_apart)(parent, do, task) for task in tasks
+    )
     return made
+
+
+def _apart(parent: int, work: Callable[..., Result], task: tuple[object, ...]) -> Result:
+    """The result of a task in a process that ``parent`` began."""
+    end_with(parent)
+    return work(*task)
 
 
 @cache
