@@ -44,7 +44,7 @@ def assert_one_line(text: str) -> None:
         ({"text": "[grid]\nresolution = 1.0\n"}, ["yard.toml", "resolution", "resolution_m"]),
         ({"text": "[[target\n"}, ["yard.toml", "TOML"]),
         ({"settings": "[safety]\nstale = 2.0\n"}, ["settings.toml", "safety.stale", "stale_s"]),
-        ({"settings": "[safety]\nstale_s = -2.0\n"}, ["settings.toml", "safety.stale_s", "greater than 0"]),
+        ({"settings": "[safety]\nstale_s = -2.0\n"}, ["settings.toml", "safety.stale_s", "more than 0", "-2.0"]),
         ({"connect": "bluetooth:1"}, ["bluetooth:1", "udpin:HOST:PORT"]),
         ({"connect": "udpin:127.0.0.1:no"}, ["'no' is not a port"]),
         ({"text": SIMULATED, "connect": "udpin:127.0.0.1:no"}, ["'no' is not a port"]),
