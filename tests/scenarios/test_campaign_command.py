@@ -68,6 +68,7 @@ def dask(what: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
         run.wait()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_the_processes_of_a_campaign_that_was_killed_end_too(campaign: Path) -> None:
     """They waited minutes for more work, with all that they had loaded."""
