@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from functools import cache
 from threading import Event, Thread
+from typing import TypeVar
 
 LOOK_S = 1.0
+Result = TypeVar("Result")
+
+
+def apart(parent: int, work: Callable[..., Result], *arguments: object) -> Result:
+    """The result of ``work`` in a process that ``parent`` began, and that ends with it."""
+    _end_with(parent)
+    return work(*arguments)
 
 
 @cache
-def end_with(parent: int) -> None:
+def _end_with(parent: int) -> None:
     """Once in each worker. ``parent``: the process that began it; without effect in that process itself."""
     if os.getpid() != parent:
         Thread(target=_watch, args=(parent,), daemon=True).start()

@@ -35,6 +35,7 @@ from companion.control.motion_kernels import (
 from companion.control.motion_planners import Found, MotionPlanner
 from companion.control.position_ahead import PositionAhead
 from companion.control.reference_path import Points, ReferencePath
+from companion.control.standstill import STANDS_M_S, Standstill
 from companion.control.told import ToldVelocity, in_force
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
@@ -68,21 +69,6 @@ STRAIGHTER_M = 0.03
 exact."""
 DRAGGED_STRAIGHTER_M = 0.1
 """The same on ground that drags it."""
-STANDS_M_S = 0.05
-STANDS_FIRST_M_S = 0.1
-"""A rover that rolls faster is told to stand before it is told to go slower than this, or the other way. ArduRover's
-integral is full from braking and is emptied only where the rover is told to stand and has stopped (``ATC_STOP_SPEED``):
-else it rolls on, or back, for seconds, told to stand, at 0.2 m/s (2.2 s to a third)."""
-STOOD_S = 0.2
-"""With a guard so long it must have stood then: what the autopilot aims at is zero a little later than the speed."""
-STANDS_FIRST_MOST_S = 2.0
-"""It waits no longer for that once it is as slow: on a slope, or by a noisy speed, it may never seem to stand."""
-AGAINST_ROLL_M_S = 0.2
-"""A rover that rolls the other way though it is told to stand is told to go against that so fast. One that brakes
-better than ArduRover lets it stands before ArduRover aims at zero, and the integral then drives it back, by itself at
-0.25 m/s for a second."""
-BRAKES_AT_ONCE_M_S2 = 3.0
-"""A rover that brakes so hard need not stand first: the integral has no time to fill."""
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
 """Turn rates for which the fastest speed is looked for that may be told, as shares of the fastest."""
 NONE_ADMITTED = np.zeros((len(TURN_SHARES), 2))
@@ -141,14 +127,7 @@ class MotionController:
         """The last one."""
         self.backwards = False
         """Whether the rover rolled tail first when it was last led."""
-        self._stands_first = False
-        """Whether it was told to stand because of that."""
-        self._fast_s = -math.inf
-        """When it last rolled faster than ``STANDS_FIRST_M_S``."""
-        self._rolled_s, self._rolled_way = -math.inf, 1.0
-        """When it rolled last, and the sign of its speed then."""
-        self._told_stand_s, self._onward = -math.inf, 1.0
-        """When it was told to stand last, and the sign of its speed when that began."""
+        self._standstill = Standstill()
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
         """The path itself."""
@@ -205,10 +184,7 @@ class MotionController:
         self.backwards = view.rolls_back
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
         self._time_s = now_s
-        if view.speed_m_s > STANDS_M_S:
-            self._rolled_s, self._rolled_way = now_s, math.copysign(1.0, view.forward_m_s)
-        if view.speed_m_s > STANDS_FIRST_M_S:
-            self._fast_s = now_s
+        self._standstill.note(view)
         self._note_way(view, passed_s)
         problem = self._problem(path, view, model)
         later = problem._replace(
@@ -223,7 +199,7 @@ class MotionController:
             return stop_for(Purpose.BLOCKED)
         found = self._planner.plan(problem, passed_s)
         told = self._against_roll(self._safe(found.motion[0], view, worst), view, worst)
-        self._stands_first = self._is_to_stand(told.speed_m_s, view)
+        self._standstill.told(told.speed_m_s, view, guarded=_alone_s(view) == 0.0)
         assert self._window is not None
         ahead = self._position.faster_than(told.speed_m_s, path, view)
         self.choice = MotionChoice(now_s, problem, found, told, self._window.corner, ahead)
@@ -270,28 +246,14 @@ class MotionController:
         return self._braking(view, worst)
 
     def _is_to_stand(self, speed_m_s: float, view: LocalView) -> bool:
-        """Whether it must have stood before it is told this: see ``STANDS_FIRST_M_S``."""
-        onward_m_s, rolls_m_s = speed_m_s * self._rolled_way, abs(view.forward_m_s)
-        # Without a guard such low speeds are how it gets through gaps: to stand each time took it 4 % longer.
-        slowest_m_s = STANDS_FIRST_M_S if _alone_s(view) == 0.0 else 0.0
-        if onward_m_s >= slowest_m_s or view.following.deceleration_m_s2 > BRAKES_AT_ONCE_M_S2:
-            return False
-        if not self._stands_first:
-            return rolls_m_s > STANDS_FIRST_M_S
-        return self._time_s - self._rolled_s < STOOD_S and self._time_s - self._fast_s < STANDS_FIRST_MOST_S
+        """Whether it must have stood before it is told this."""
+        return self._standstill.is_needed_for(speed_m_s, view, guarded=_alone_s(view) == 0.0)
 
     def _against_roll(self, told: ToldVelocity, view: LocalView, worst: Problems) -> ToldVelocity:
-        """To go slowly against it where it rolls the other way though it is told to stand: see ``AGAINST_ROLL_M_S``."""
-        if told.speed_m_s:
-            return told
-        if self._time_s - self._told_stand_s > STOOD_S:
-            self._onward = math.copysign(1.0, view.forward_m_s)
-        self._told_stand_s = self._time_s
-        rolls_m_s = -self._onward * view.forward_m_s
-        if rolls_m_s <= STANDS_FIRST_M_S or view.following.deceleration_m_s2 > BRAKES_AT_ONCE_M_S2:
-            return told
-        against = told._replace(speed_m_s=self._onward * AGAINST_ROLL_M_S)
-        return against if _may_be_left_alone(against, view, worst) else told
+        """Against its roll, where it is to stand and rolls back."""
+        against_m_s = 0.0 if told.speed_m_s else self._standstill.against_roll_m_s(view)
+        against = told._replace(speed_m_s=against_m_s)
+        return against if against_m_s and _may_be_left_alone(against, view, worst) else told
 
     def _braking(self, view: LocalView, worst: Problems) -> ToldVelocity:
         """The way to brake that keeps most room; straight on where there is enough, or where dragged and in doubt."""

@@ -19,7 +19,7 @@ from sitl.campaign.drive_run import drive
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests
 from sitl.campaign.worker_start import begin
-from sitl.worker_end import end_with
+from sitl.worker_end import apart
 
 Done = Iterator[tuple[RunSpec, RunResult]]
 RETRIES = 3
@@ -44,7 +44,7 @@ def driven_here(specs: Sequence[RunSpec], digests: Digests, jobs: int) -> Done:
     except ImportError as error:
         raise CampaignError(not_installed(f"--jobs {jobs}", "experiments", "joblib")) from error
     done: Done = Parallel(n_jobs=jobs, return_as="generator_unordered")(
-        delayed(_checked_apart)(os.getpid(), spec, digests.of(spec), digests.folder) for spec in specs
+        delayed(apart)(os.getpid(), _checked, spec, digests.of(spec), digests.folder) for spec in specs
     )
     return _told(done, "a process of --jobs has ended (for want of memory?)")
 
@@ -124,12 +124,6 @@ def _checked(spec: RunSpec, digest: str, folder: Path) -> tuple[RunSpec, RunResu
             "the same command drives again what that changes"
         )
     return spec, result
-
-
-def _checked_apart(parent: int, spec: RunSpec, digest: str, folder: Path) -> tuple[RunSpec, RunResult]:
-    """The same in a process that ``parent`` began."""
-    end_with(parent)
-    return _checked(spec, digest, folder)
 
 
 def _checked_on_a_worker(spec: RunSpec, digest: str, folder: Path) -> tuple[RunSpec, RunResult]:

@@ -30,7 +30,7 @@ from companion.storage.files import why_no_file
 from companion.storage.shipped import SOURCE, shipped
 from sitl.experiments import drawing
 from sitl.experiments.results_page import write_section
-from sitl.worker_end import end_with
+from sitl.worker_end import apart
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -208,15 +208,9 @@ def each(
     do = work if keep is None else Memory(keep / code_digest(), verbose=0).cache(work)
     parent = os.getpid()
     made: Iterator[Result] = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_apart)(parent, do, task) for task in tasks
+        delayed(apart)(parent, do, *task) for task in tasks
     )
     return made
-
-
-def _apart(parent: int, work: Callable[..., Result], task: tuple[object, ...]) -> Result:
-    """The result of a task in a process that ``parent`` began."""
-    end_with(parent)
-    return work(*task)
 
 
 @cache

@@ -15,7 +15,6 @@ from companion.control.following import AS_SHIPPED, Following, turn_gains, withi
 from companion.control.local_view import LocalView
 from companion.control.motion_controller import (
     FASTER_DRAGGED_M_S,
-    STANDS_M_S,
     MotionController,
     _faster_s,
     _latest,
@@ -27,6 +26,7 @@ from companion.control.motion_planners import Found, motion_planner
 from companion.control.motion_prediction import braked_m
 from companion.control.position_ahead import PositionAhead
 from companion.control.reference_path import ReferencePath, advanced
+from companion.control.standstill import STANDS_M_S
 from companion.control.told import Told, ToldVelocity, after
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint, Pose
