@@ -28,8 +28,8 @@ from companion.control.motion_kernels import (
     Start,
     Weights,
     admitted_speeds,
-    always_may_be_last,
     braking_spares_m,
+    may_be_last,
     way_of,
 )
 from companion.control.motion_planners import Found, MotionPlanner
@@ -324,9 +324,7 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: Problems) -> 
     """Whether this may be the last command, however the rover turns."""
     lasts_s, margin_m, faster_s = view.settings.guidance.velocity_lasts_s, WEIGHTS.margin_m, _faster_s(view)
     gains = turn_gains(view.following, lasts_s)
-    return all(
-        always_may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gains, margin_m, faster_s, one) for one in worst
-    )
+    return all(may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gains, margin_m, faster_s, one) for one in worst)
 
 
 def _sooner_or_later(later: MotionProblem, view: LocalView) -> Problems:
