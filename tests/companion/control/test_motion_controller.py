@@ -411,15 +411,15 @@ def test_without_a_guard_what_is_told_is_safe_whether_it_is_obeyed_late_or_soon(
 
 
 class Wants:
-    """Stands in for a planner that always wants this speed, straight on."""
+    """Stands in for a planner that always wants this speed and turn rate."""
 
-    def __init__(self, speed_m_s: float) -> None:
-        self.wanted_m_s = speed_m_s
+    def __init__(self, speed_m_s: float, turn_rad_s: float = 0.0) -> None:
+        self.wanted_m_s, self.turn_rad_s = speed_m_s, turn_rad_s
         self.forgotten = 0
 
     def plan(self, problem: MotionProblem, passed_s: float) -> Found:
         motion = np.zeros((6, 2))
-        motion[:, 0] = self.wanted_m_s
+        motion[:] = self.wanted_m_s, self.turn_rad_s
         return Found(motion, 1.0, motion[None], np.ones(1))
 
     def forget(self) -> None:
@@ -468,6 +468,27 @@ def test_it_looks_as_far_as_where_the_rover_would_come_to_stand() -> None:
     north_m = leads.choice.corner.north_m + len(seen.gap_m) * seen.cell_m
     stops_m = 2.0**2 / (2.0 * at.following.deceleration_m_s2)
     assert north_m > 8.0 + AROUND_M + stops_m
+
+
+def test_what_may_not_be_told_is_told_slower_on_the_same_arc() -> None:
+    """Before a wall it would stand in time from a part of the speed."""
+    evidence = ground()
+    wall(evidence, 7.4, 5.0, 15.0)
+    planner = Wants(1.8, 0.2)
+    at = replace(view(evidence, Pose(5.0, 10.0, 0.0, 0.0), 0.5, STRICT), following=KNOWN)
+    leads = MotionController(FOOTPRINT, planner)
+    assert leads.follow(PATH, at).purpose is Purpose.DRIVE and leads.choice is not None
+    told = leads.choice.told
+    assert 0.1 < told.speed_m_s < 1.7 and told.turn_rad_s / told.speed_m_s == pytest.approx(0.2 / 1.8)
+
+
+def test_a_rover_that_stands_and_may_be_told_nothing_is_blocked() -> None:
+    """By its planner, that is: there is room to go on, which other motions would use."""
+    evidence = ground()
+    wall(evidence, 5.6, 5.0, 15.0)
+    for speed_m_s, purpose in ((0.0, Purpose.BLOCKED), (0.3, Purpose.BRAKE)):
+        at = view(evidence, Pose(5.0, 10.0, 0.0, 0.0), speed_m_s, STRICT)
+        assert MotionController(FOOTPRINT, Wants(1.8)).follow(PATH, at).purpose is purpose
 
 
 @pytest.mark.parametrize("wanted_m_s", [0.4, -0.4])

@@ -323,6 +323,18 @@ def test_to_go_back_is_to_brake_first_and_is_looked_at_from_where_the_rover_stan
     assert fault_of(GuidedVelocity(0.5, 0.0), rolling(2.0, lately=told), Bounds()) is not None
 
 
+@pytest.mark.parametrize("walled", [False, True])
+def test_a_rover_that_cannot_stop_in_time_may_go_back_but_not_into_what_stands_behind_it(walled: bool) -> None:
+    """It brakes all the same; then it goes back for what is left of three seconds."""
+    at = rolling(0.5)
+    at.evidence.log_odds[round((MIDDLE + 0.5) / at.evidence.evidence_m)] = 3.0
+    if walled:
+        at.evidence.log_odds[round((MIDDLE - 1.2) / at.evidence.evidence_m)] = 3.0
+    at = replace(at, settings=Settings.model_validate({"guidance": {"controller": "motion-ga"}}))
+    assert fault_of(GuidedVelocity(0.3, 0.0), at, Bounds()) is not None
+    assert (fault_of(GuidedVelocity(-1.0, 0.0), at, Bounds()) is not None) is walled
+
+
 def test_what_was_told_lately_is_counted_until_a_new_velocity_shows() -> None:
     faster, slower = (ToldVelocity(-0.3, 2.0, 0.0),), (ToldVelocity(-0.3, 0.0, 0.0),)
     wanted = GuidedVelocity(0.6, 0.0)
