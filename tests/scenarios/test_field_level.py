@@ -121,7 +121,7 @@ def test_each_experiment_replaces_only_its_own_section(tmp_path):
         (["kwasniewski-table1", "--maps", "{tmp}"], "known-1.png"),
         (["kwasniewski-maps", "--json", "{tmp}"], "cannot be written"),
         (["kwasniewski-maps", "--docs", "/dev/null/docs"], "/dev/null/docs/results.md: cannot be written"),
-        (["wang-table4", "--world", "{tmp}/none.map"], "--world: wang-table4 has its own maps"),
+        (["wang-table4", "--world", "{tmp}/none.map"], "--world: wang-table4 does not take it"),
         (["achour-table1", "--maps", "{tmp}"], "--maps: achour-table1"),
         (["wang-table4", "--planners", "hybrid"], "--planners"),
         (["navigation", "--planners", "nope"], "unknown planner 'nope'"),
