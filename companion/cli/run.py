@@ -8,13 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
 
 import typer
 from rich.console import Console
 
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
+from companion.cli import run_options as options
 from companion.cli.arming_advice import ArmingAdvice
 from companion.cli.ending import ended, print_statuses
 from companion.cli.entry import EXIT_STOPPED
@@ -68,35 +68,21 @@ UNHURRIED_S = 10.0
 
 
 def run(
-    connect: Annotated[
-        str,
-        typer.Option(
-            help="The autopilot: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT "
-            "or serial:DEVICE:BAUD."
-        ),
-    ],
-    mission_file: Annotated[
-        Path | None, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.", show_default=False)
-    ] = None,
-    from_autopilot: Annotated[
-        bool, typer.Option("--from-autopilot", help="Drive the mission that the autopilot has stored.")
-    ] = False,
+    connect: options.Connect,
+    mission_file: options.MissionFile = None,
+    from_autopilot: options.FromAutopilot = False,
     resolution_m: ResolutionM = None,
     radius_m: RadiusM = None,
     speed_m_s: SpeedMS = None,
-    arm: Annotated[bool, typer.Option("--arm", help="Arm the motors; otherwise wait for a person to do it.")] = False,
-    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
+    arm: options.Arm = False,
+    settings_file: options.SettingsFile = None,
     planner: PlannerName = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
-    record: Annotated[Path | None, typer.Option(help="Directory for the record and the map of this run.")] = None,
-    state: Annotated[Path | None, typer.Option(help="Directory where this rover's state is kept.")] = None,
+    seed: options.Seed = 0,
+    record: options.Record = None,
+    state: options.State = None,
     lidar: LidarOption = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on where the run that kept its state there ended.")
-    ] = False,
-    signing_key: Annotated[
-        Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
-    ] = None,
+    resume: options.Resume = False,
+    signing_key: options.SigningKey = None,
     skip_unknown: SkipUnknown = False,
     laps: Laps = None,
     web: Web = None,
@@ -127,10 +113,7 @@ def run(
             budget = ShutdownBudget()
             files = StateFiles(state, budget)
             ends.callback(files.close)
-            settings, specs = (
-                files.settings(usable_settings(settings_file, planner), say),
-                lidars_given(lidar, connect),
-            )
+            settings, specs = files.settings(usable_settings(settings_file, planner), say), lidars_given(lidar, connect)
             signer = files.signer(signing_key)
             painter = painter_for(view=view, say=say)
             page = web_viewer(web, web_token, warn, actions=web_actions, signer=signer)
@@ -154,20 +137,10 @@ def run(
             if keeping.ended:
                 raise typer.Exit(print_statuses(keeping.statuses))
             given = {"settings": settings_file, STATE: keeping.file if keeping.previous else None}
-            recorder = (
-                Recorder(
-                    record,
-                    mission,
-                    settings,
-                    seed,
-                    arm=arm,
-                    files=given,
-                    worker=BackgroundWorker("record", budget),
-                    lidars=[one.text for one in specs],
-                )
-                if record
-                else NullRecorder()
-            )
+            recorder = NullRecorder() if record is None else Recorder(
+                record, mission, settings, seed, arm=arm, files=given, worker=BackgroundWorker("record", budget),
+                lidars=[one.text for one in specs],
+            )  # fmt: skip
             lidars = _lidars(specs, recorder, ends)
             with console.status("loading the planner ..."):
                 _load_planner(settings, mission, say)
