@@ -151,7 +151,8 @@ class ControllersReport(ExperimentReport):
     def section(self) -> str:
         """See ``ExperimentReport``."""
         tables = "\n\n".join(f"{kind}:\n\n{self._section_of(kind)}" for kind in self._kinds())
-        return f"""## Planned motions against points
+        harder = "" if self.options.usual else ", harder rovers and links"
+        return f"""## Planned motions against points{harder}
 
 `{self.options.command(NAME)}`
 
