@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from companion.control.blind_behind import backwards_m_s
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.following import GUARDED_S, Following, turn_gains
+from companion.control.last_command_kernels import admitted_speeds, braking_spares_m, may_be_last
 from companion.control.local_view import LocalView
 from companion.control.motion_ground import NEAR_M, Window, look_round, unseen_to_m
 from companion.control.motion_kernels import (
@@ -27,9 +28,6 @@ from companion.control.motion_kernels import (
     RoverModel,
     Start,
     Weights,
-    admitted_speeds,
-    braking_spares_m,
-    may_be_last,
     way_of,
 )
 from companion.control.motion_planners import Found, MotionPlanner

@@ -34,13 +34,6 @@ ARRIVED_S = 0.1
 """With so little time left, the rest of a motion does not count."""
 MOST_PIECES = 40
 """Of a braking distance that is looked at."""
-ENDLESS = 600
-"""Steps: a rover that takes longer to stop may not be left alone with anything."""
-SLOWEST = 1e-6
-"""m/s² and rad/s²: one that brakes no better does not stop."""
-TURNING = 6
-"""What is known of a turning rover after a step: sine and cosine of its heading on average and at the end of the step,
-by how much it has turned in it (rad) and how fast it turns then (rad/s)."""
 NEARER_M, NEAREST_M = 0.01, -0.04
 """A rover that is too near to something may come nearer by the first, so that it gets away, but only down to the
 second: else it would come nearer with every look."""
@@ -167,11 +160,11 @@ def clearance_m(raster, cell_m, body, x_m, y_m, heading_rad, outside_m=AS_AT_EDG
     nearest = at_place(raster, cell_m, x_m, y_m, outside_m) - body.around_m
     if nearest > ROOMY_M:
         return nearest
-    return _discs_clear_m(raster, cell_m, body, x_m, y_m, math.sin(heading_rad), math.cos(heading_rad), outside_m)
+    return discs_clear_m(raster, cell_m, body, x_m, y_m, math.sin(heading_rad), math.cos(heading_rad), outside_m)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _discs_clear_m(raster, cell_m, body, x_m, y_m, sine, cosine, outside_m):
+def discs_clear_m(raster, cell_m, body, x_m, y_m, sine, cosine, outside_m):
     """``clearance_m`` by a closer look, for a heading with this sine and cosine."""
     nearest = FAR_M
     for disc in range(body.ahead_m.size):
@@ -181,14 +174,14 @@ def _discs_clear_m(raster, cell_m, body, x_m, y_m, sine, cosine, outside_m):
 
 
 @njit(cache=True, nogil=True)
-def _least_m(raster, cell_m, body, start, outside_m=AS_AT_EDGE):
+def least_allowed_m(raster, cell_m, body, start, outside_m=AS_AT_EDGE):
     """The clearance that a rover which is too near to something must keep."""
     now_m = clearance_m(raster, cell_m, body, start.x_m, start.y_m, start.heading_rad, outside_m)
     return min(max(now_m - NEARER_M, NEAREST_M), now_m)
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _still_m(least_m, start, state):
+def still_allowed_m(least_m, start, state):
     """The clearance that such a rover must keep at a place on its way."""
     if least_m >= 0.0:
         return least_m
@@ -224,13 +217,13 @@ def _told_in(step, knots, pending, step_share):
 def moved(state, told_m_s, told_rad_s, model, step_s):
     """The rover a step later: place, heading, speed, turn rate."""
     x, y, heading, speed, turn = state
-    speed = _speed_after(speed, told_m_s, model, step_s)
-    middle, heading, turn = _turned(heading, turn, told_rad_s, model, step_s)
+    speed = speed_after(speed, told_m_s, model, step_s)
+    middle, heading, turn = turned(heading, turn, told_rad_s, model, step_s)
     return x + speed * step_s * math.sin(middle), y + speed * step_s * math.cos(middle), heading, speed, turn
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _speed_after(speed, told_m_s, model, step_s):
+def speed_after(speed, told_m_s, model, step_s):
     """The speed a step later."""
     change = told_m_s - speed
     most = (model.decel_m_s2 if change * speed < 0.0 else model.accel_m_s2) * step_s
@@ -238,7 +231,7 @@ def _speed_after(speed, told_m_s, model, step_s):
 
 
 @njit(cache=True, nogil=True, inline="always")
-def _turned(heading, turn, told_rad_s, model, step_s):
+def turned(heading, turn, told_rad_s, model, step_s):
     """The heading in the middle of a step, and heading and turn rate after it."""
     most_turn = model.turn_accel_rad_s2 * step_s
     after = turn + min(max(model.turn_gain * told_rad_s - turn, -most_turn), most_turn)
@@ -260,7 +253,7 @@ def cost_s(knots, problem):
     if early > 0:
         last = pending[early - 1]
         extra = weights.change * (abs(knots[0, 0] - last[0]) + abs(knots[0, 1] - last[1]))
-    least = _least_m(gap_m, cell_m, body, start)
+    least = least_allowed_m(gap_m, cell_m, body, start)
     first_s = left_s(togo_s, togo_cell_m, start.x_m, start.y_m)
     between_m = BETWEEN_CELLS * cell_m
     matters_m = max(weights.near_m, weights.margin_m + weights.margin_s * _fastest_m_s(knots, start, model)) + between_m
@@ -277,7 +270,7 @@ def cost_s(knots, problem):
         if sure_m <= 0.0:
             room = clearance_m(gap_m, cell_m, body, x, y, heading, AS_AT_EDGE)
             sure_m = room - matters_m
-            if room < min(0.0, _still_m(least, start, state)):
+            if room < min(0.0, still_allowed_m(least, start, state)):
                 return BLOCKED_S * (2.0 - step / steps) + left_s(togo_s, togo_cell_m, x, y)
             margin = weights.margin_m + weights.margin_s * speed
             if room < margin:
@@ -297,7 +290,7 @@ def cost_s(knots, problem):
             extra += HASTE * max(speed - stops_m_s, 0.0) * step_s
         if left < ARRIVED_S:
             return step * step_s + extra
-    return steps * step_s + extra + _after_s(state, _still_m(least, start, state), problem)
+    return steps * step_s + extra + _after_s(state, still_allowed_m(least, start, state), problem)
 
 
 @njit(cache=True, nogil=True)
@@ -417,107 +410,6 @@ def costs_s(motions, problem):
 
 
 @njit(cache=True, nogil=True)
-def _turnings(told_rad_s, held, gains, fastest_m_s, problem):
-    """How a rover turns that is told a turn rate for ``held`` steps and then to stand, one row a step.
-
-    Shape (gains, steps, ``TURNING``): it turns by each of the factors ``gains`` more than told. How fast it goes does
-    not matter for that: so all speeds share one, and no sine is found twice. The steps are enough for a rover that is
-    no faster than ``fastest_m_s`` to stand.
-    """
-    start, model, pending, step_s = problem.start, problem.model, problem.pending, problem.step_s
-    early = pending.shape[0]
-    fastest_m_s, fastest_rad_s = max(fastest_m_s, abs(start.speed_m_s)), abs(told_rad_s)
-    for step in range(early):
-        fastest_m_s = max(fastest_m_s, abs(pending[step, 0]))
-        fastest_rad_s = max(fastest_rad_s, abs(pending[step, 1]))
-    fastest_rad_s = max(model.turn_gain * max(gains) * fastest_rad_s, abs(start.turn_rad_s))
-    stands_s = max(fastest_m_s / max(model.decel_m_s2, SLOWEST), fastest_rad_s / max(model.turn_accel_rad_s2, SLOWEST))
-    steps = early + held + int(min(stands_s / step_s + 2.0, ENDLESS + 1.0))
-    rows = np.empty((len(gains), steps, TURNING))
-    for at, factor in enumerate(gains):
-        heading, turn = start.heading_rad, start.turn_rad_s
-        for step in range(steps):
-            now_rad_s = 0.0
-            if step < early:
-                now_rad_s = pending[step, 1]
-            elif step < early + held:
-                now_rad_s = told_rad_s
-            before = heading
-            middle, heading, turn = _turned(heading, turn, factor * now_rad_s, model, step_s)
-            rows[at, step, 0], rows[at, step, 1] = math.sin(middle), math.cos(middle)
-            rows[at, step, 2], rows[at, step, 3] = math.sin(heading), math.cos(heading)
-            rows[at, step, 4], rows[at, step, 5] = abs(heading - before), abs(turn)
-    return rows
-
-
-@njit(cache=True, nogil=True)
-def _spare_m(told_m_s, held, turning, margin_m, margin_s, problem, least_m, most_m):
-    """How much more room than it must keep a rover has that is left alone, at the worst place; below 0 it may not be.
-
-    It is told a speed for ``held`` steps and then to stand, and turns as ``turning`` says, one of ``_turnings``. It
-    must keep ``margin_m``, and ``margin_s`` more for each m/s, over ground that is free and seen.
-    Exact only between ``least_m`` and ``most_m``: where it is surely less, the rest of the way is not looked at, and
-    where it is surely more, the rover is followed without a look until it may have come nearer.
-    """
-    start, ground, body, model = problem.start, problem.ground, problem.body, problem.model
-    pending, step_s = problem.pending, problem.step_s
-    gap_m, seen_m, cell_m = ground.gap_m, ground.seen_m, ground.cell_m
-    x, y, speed, turn = start.x_m, start.y_m, start.speed_m_s, start.turn_rad_s
-    early, side_m = pending.shape[0], body.around_m - body.radius_m
-    still = _least_m(gap_m, cell_m, body, start)
-    still_seen = _least_m(seen_m, cell_m, body, start, 0.0)
-    fastest_m_s = max(abs(start.speed_m_s), abs(told_m_s))
-    for before in range(early):
-        fastest_m_s = max(fastest_m_s, abs(pending[before, 0]))
-    roomy_m = margin_m + margin_s * fastest_m_s + most_m + BETWEEN_CELLS * cell_m
-    step, spare, sure_m = 0, FAR_M, 0.0
-    while step < early + held or abs(speed) > 0.02 or abs(turn) > 0.02:
-        if step == turning.shape[0]:
-            return -FAR_M
-        now_m_s = 0.0
-        if step < early:
-            now_m_s = pending[step, 0]
-        elif step < early + held:
-            now_m_s = told_m_s
-        speed, turn = _speed_after(speed, now_m_s, model, step_s), turning[step, 5]
-        x, y = x + speed * step_s * turning[step, 0], y + speed * step_s * turning[step, 1]
-        sine, cosine = turning[step, 2], turning[step, 3]
-        sure_m -= abs(speed) * step_s + side_m * turning[step, 4]
-        step += 1
-        if sure_m > 0.0:
-            continue
-        # As ``clearance_m``, written out: here that takes a third less.
-        clear_m = at_place(gap_m, cell_m, x, y, AS_AT_EDGE) - body.around_m
-        if clear_m <= ROOMY_M:
-            clear_m = _discs_clear_m(gap_m, cell_m, body, x, y, sine, cosine, AS_AT_EDGE)
-        clear_seen_m = at_place(seen_m, cell_m, x, y, 0.0) - body.around_m
-        if clear_seen_m <= ROOMY_M:
-            clear_seen_m = _discs_clear_m(seen_m, cell_m, body, x, y, sine, cosine, 0.0)
-        sure_m = min(clear_m, clear_seen_m) - roomy_m
-        room_m = min(margin_m + margin_s * abs(speed), _still_m(still, start, (x, y)))
-        spare = min(spare, clear_m - room_m, clear_seen_m - min(margin_m, still_seen))
-        if spare < least_m:
-            break
-    return spare
-
-
-@njit(cache=True, nogil=True)
-def _least_spare_m(told_m_s, held, turnings, margin_m, margin_s, problem, least_m, most_m):
-    """``_spare_m`` in the worst of these ways to turn."""
-    spare = FAR_M
-    for way in range(turnings.shape[0]):
-        spare = min(spare, _spare_m(told_m_s, held, turnings[way], margin_m, margin_s, problem, least_m, most_m))
-        if spare < least_m:
-            break
-    return spare
-
-
-@njit(cache=True, nogil=True)
-def _steps(lasts_s, problem):
-    return int(math.ceil(lasts_s / problem.step_s))
-
-
-@njit(cache=True, nogil=True)
 def begin_later(motions, share):
     """The same motions begun a share of the horizon later, in place; what lies beyond its end stays as it is there."""
     count, size, _ = motions.shape
@@ -540,67 +432,6 @@ def keep_within(motion, problem):
             at = int(round(0.5 * last * (1.0 + motion[knot, 1] / model.turn_fastest_rad_s)))
             fastest_m_s, backwards_m_s = admitted[at, 0], admitted[at, 1]
         motion[knot, 0] = min(max(motion[knot, 0], -backwards_m_s), fastest_m_s)
-
-
-@njit(cache=True, nogil=True)
-def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem):
-    """The fastest speeds at these turn rates, forwards and backwards, shape (n, 2), that may be the last command.
-
-    Whether the rover turns by any of the factors ``gains``. A few speeds are tried, and then some between the fastest
-    of them that may be told and the next.
-    """
-    model, held = problem.model, _steps(lasts_s, problem)
-    fastest_m_s = max(model.fastest_m_s, model.backwards_m_s)
-    admitted = np.zeros((turns_rad_s.size, 2))
-    for at in range(turns_rad_s.size):
-        turnings = _turnings(turns_rad_s[at], held, gains, fastest_m_s, problem)
-        for side in range(2):
-            most = model.fastest_m_s if side == 0 else -model.backwards_m_s
-            share, step = 1.0, 1.0 / TRIED
-            while share > 0.5 * step and (
-                _least_spare_m(most * share * share, held, turnings, margin_m, margin_s, problem, 0.0, 0.0) < 0.0
-            ):
-                share -= step
-            if share < 0.5 * step:
-                continue
-            if share < 1.0 - 0.5 * step:
-                for _ in range(HALVED):
-                    step *= 0.5
-                    faster = share + step
-                    tried = most * faster * faster
-                    if _least_spare_m(tried, held, turnings, margin_m, margin_s, problem, 0.0, 0.0) >= 0.0:
-                        share = faster
-            admitted[at, side] = abs(most * share * share)
-    return admitted
-
-
-@njit(cache=True, nogil=True)
-def may_be_last(told_m_s, told_rad_s, lasts_s, gains, margin_m, margin_s, problem):
-    """Whether a command may be the last: held so long, then braked, it leads over ground that is free and seen.
-
-    The rover keeps ``margin_m``, and ``margin_s`` more for each m/s, whether it turns by any of the factors ``gains``.
-    """
-    return spare_m(told_m_s, told_rad_s, lasts_s, gains, margin_m, margin_s, problem, 0.0, 0.0) >= 0.0
-
-
-@njit(cache=True, nogil=True)
-def spare_m(told_m_s, told_rad_s, lasts_s, gains, margin_m, margin_s, problem, least_m=-math.inf, most_m=FAR_M):
-    """How much more room than it must keep such a rover has, at the worst place.
-
-    Exact between ``least_m`` and ``most_m`` only.
-    """
-    held = _steps(lasts_s, problem)
-    turnings = _turnings(told_rad_s, held, gains, abs(told_m_s), problem)
-    return _least_spare_m(told_m_s, held, turnings, margin_m, margin_s, problem, least_m, most_m)
-
-
-@njit(cache=True, nogil=True)
-def braking_spares_m(turns_rad_s, lasts_s, gains, most_m, problem):
-    """``spare_m`` of a rover that is told to stand and to turn, for each turn rate; not exact above ``most_m``."""
-    spares = np.empty(turns_rad_s.size)
-    for at in range(turns_rad_s.size):
-        spares[at] = spare_m(0.0, turns_rad_s[at], lasts_s, gains, 0.0, 0.0, problem, -math.inf, most_m)
-    return spares
 
 
 @njit(cache=True, nogil=True)
@@ -652,9 +483,5 @@ def evolve(motions, best, chances, kicks, sizes, problem):
 
 LONG = 1.6
 """A rover is long if its discs lie along so many times their radius: turning then moves its ends far."""
-TRIED = 10
-"""So many speeds are tried, the slower the closer."""
-HALVED = 3
-"""So many times the step between two of them is halved: with 2 m/s next to 1.6, 1.9 would be lost."""
 MUTATED = 0.4
 """So large a share of a child's knots is changed."""

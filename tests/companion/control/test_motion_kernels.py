@@ -1,4 +1,4 @@
-"""What motions cost, and when a command may be the last."""
+"""What motions cost."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from companion.control.motion_controller import WEIGHTS as DRIVEN_WITH
 from companion.control.motion_kernels import (
@@ -20,16 +18,13 @@ from companion.control.motion_kernels import (
     RoverModel,
     Start,
     Weights,
-    admitted_speeds,
     at_place,
     begin_later,
     clearance_m,
     cost_s,
     keep_within,
-    may_be_last,
     moved,
     next_generation,
-    spare_m,
     told_at,
 )
 from companion.mapping.cost_to_go import cost_to_go
@@ -106,15 +101,6 @@ def test_narrow_and_unseen_ground_cost_more() -> None:
     assert free < cost_s(constant(1.0), problem(unseen_from=30))
 
 
-@pytest.mark.parametrize("margin_m", [0.0, 0.05])
-def test_a_rover_that_is_too_near_already_may_get_away_but_come_no_nearer(margin_m: float) -> None:
-    ground = problem((23, 25, 0, SIDE))  # 5 cm before its front
-    assert cost_s(constant(-0.3), ground) < BLOCKED_S < cost_s(constant(0.3), ground)
-    assert may_be_last(-0.3, 0.0, 0.3, (1.0,), margin_m, 0.0, ground) and not may_be_last(
-        0.5, 0.0, 0.3, (1.0,), margin_m, 0.0, ground
-    )
-
-
 def test_a_rover_too_fast_to_stop_at_the_end_of_its_path_costs_more_and_one_that_passes_through_does_not() -> None:
     near_end = Start(5.0, 6.5, 0.0, 1.9, 0.0)
     fast, braking = constant(1.9), constant(0.6)
@@ -126,37 +112,6 @@ def test_what_passes_nearly_touching_costs_more_the_faster_it_does() -> None:
     beside = problem((25, 45, 54, 56))
     dearer = [cost_s(constant(speed_m_s), beside) - cost_s(constant(speed_m_s), problem()) for speed_m_s in (0.5, 1.5)]
     assert 0.0 < dearer[0] < dearer[1] < BLOCKED_S
-
-
-def test_a_fast_rover_that_is_left_alone_keeps_more_room() -> None:
-    beside, rolling = (25, 45, 54, 56), Start(5.0, 2.0, 0.0, 1.5, 0.0)
-    assert may_be_last(1.5, 0.0, 0.3, (1.0,), 0.0, 0.0, problem(beside, start=rolling))
-    assert not may_be_last(1.5, 0.0, 0.3, (1.0,), 0.0, 0.2, problem(beside, start=rolling))
-
-
-def test_ground_that_was_not_seen_beside_it_does_not_let_it_touch_what_was() -> None:
-    """A rover whose side stands over unseen ground may go on over such ground, but into nothing."""
-    started = Start(5.0, 2.0, 0.0, 0.0, 0.0)
-    unseen = problem((35, 37, 0, SIDE), start=started, unseen_from=21)
-    assert not may_be_last(1.5, 0.0, 1.0, (1.0,), 0.0, 0.0, unseen)
-
-
-def test_a_command_may_be_the_last_if_the_way_it_leads_to_a_stop_is_free_and_seen() -> None:
-    rolling = Start(5.0, 2.0, 0.0, 1.0, 0.0)
-    # 0.2 s pending, which brakes; 0.3 s held; then 1 m/s² down: 1.1 m and the front.
-    for unseen_from, may in ((36, True), (31, False)):
-        assert may_be_last(1.0, 0.0, 0.3, (1.0,), 0.0, 0.0, problem(start=rolling, unseen_from=unseen_from)) is may
-    assert not may_be_last(1.0, 0.0, 3.0, (1.0,), 0.0, 0.0, problem(start=rolling, unseen_from=36))
-    turns = problem((20, 40, 57, 59), start=rolling)
-    assert may_be_last(1.0, 0.5, 0.5, (1.0,), 0.0, 0.0, turns) and not may_be_last(
-        1.0, 0.5, 3.0, (1.0,), 0.0, 0.0, turns
-    )
-
-
-def test_a_rover_that_hardly_brakes_may_not_be_left_alone_and_that_is_found_soon() -> None:
-    rolling = problem(start=Start(5.0, 5.0, 0.0, 1.0, 0.0))
-    assert may_be_last(1.0, 3.0, 0.3, (1.0,), 0.0, 0.0, rolling)
-    assert not may_be_last(1.0, 3.0, 0.3, (1.0,), 0.0, 0.0, rolling._replace(model=MODEL._replace(decel_m_s2=1e-9)))
 
 
 def test_the_model_follows_with_limited_changes() -> None:
@@ -212,89 +167,6 @@ def test_no_motion_begins_faster_than_is_admitted_at_its_turn_rate() -> None:
             motion = constant(told_m_s, turn_rad_s)
             keep_within(motion, problem()._replace(admitted_m_s=admitted))
             assert motion[0, 0] == kept_m_s and abs(motion[1, 0]) <= 2.0
-
-
-def test_less_is_admitted_towards_a_wall_and_the_less_the_longer_it_lasts() -> None:
-    """Straight on, to the left and to the right; a wall 2 m ahead, which a turn does not meet."""
-    turns, gains = np.array((-1.5, 0.0, 1.5)), (1.0, 0.9, 1.1)
-    shorter, longer = (
-        admitted_speeds(turns, lasts_s, gains, 0.03, 0.05, problem((40, 42, 0, SIDE))) for lasts_s in (0.3, 3.0)
-    )
-    free = admitted_speeds(turns, 0.3, gains, 0.03, 0.05, problem())
-    assert free[1, 0] == MODEL.fastest_m_s and shorter[1, 0] <= free[1, 0]
-    assert 0.0 < longer[1, 0] < 0.6 < shorter[1, 0]
-    for told_m_s in (shorter[1, 0], longer[1, 0]):
-        lasts_s = 0.3 if told_m_s == shorter[1, 0] else 3.0
-        assert may_be_last(told_m_s, 0.0, lasts_s, (1.0,), 0.03, 0.05, problem((40, 42, 0, SIDE)))
-    faster_m_s = 1.08 * longer[1, 0]
-    assert not may_be_last(faster_m_s, 0.0, 3.0, (1.0,), 0.03, 0.05, problem((40, 42, 0, SIDE))), "little is lost"
-
-
-def test_a_rover_that_touches_something_may_leave_it_but_not_touch_the_next_thing() -> None:
-    """It stands 5 cm over a wall behind it; 3 m ahead there is another one."""
-    start = STANDING._replace(y_m=2.0 + BODY.around_m - 0.05)
-    behind, ahead, both = (
-        problem(*walls, start=start)
-        for walls in ([(19, 20, 0, SIDE)], [(50, 52, 0, SIDE)], [(19, 20, 0, SIDE), (50, 52, 0, SIDE)])
-    )
-    room_m = clearance_m(both.ground.gap_m, CELL_M, BODY, start.x_m, start.y_m, start.heading_rad)
-    assert -0.1 < room_m < -0.02
-    speeds_m_s = np.arange(0.05, 1.5, 0.01)
-    assert all(may_be_last(speed, 0.0, 3.0, (1.0,), 0.03, 0.05, behind) for speed in speeds_m_s)
-    passed = [speed for speed in speeds_m_s if may_be_last(speed, 0.0, 3.0, (1.0,), 0.03, 0.05, both)]
-    assert 0.3 < max(passed) < 1.0
-    assert all(may_be_last(speed, 0.0, 3.0, (1.0,), 0.0, 0.0, ahead) for speed in passed)
-
-
-@given(
-    st.lists(st.tuples(st.integers(0, 95), st.integers(0, 95)), min_size=1, max_size=12),
-    st.integers(40, SIDE),
-    st.floats(-0.5, 2.0),
-    st.floats(-1.5, 1.5),
-    st.floats(-0.5, 2.0),
-    st.floats(0.0, 0.2),
-)
-def test_where_there_is_surely_room_no_look_is_needed(
-    posts: list[tuple[int, int]], unseen_from: int, told_m_s: float, turn_rad_s: float, now_m_s: float, margin_s: float
-) -> None:
-    walls = [(row, row + 3, column, column + 2) for row, column in posts]
-    ground = problem(*walls, start=Start(5.0, 2.0, 0.3, now_m_s, 0.5 * turn_rad_s), unseen_from=unseen_from)
-    exact_m = spare_m(told_m_s, turn_rad_s, 2.0, (1.3,), 0.03, margin_s, ground)
-    assert may_be_last(told_m_s, turn_rad_s, 2.0, (1.3,), 0.03, margin_s, ground) is (exact_m >= 0.0)
-    enough_m = spare_m(told_m_s, turn_rad_s, 2.0, (1.3,), 0.03, margin_s, ground, -math.inf, 0.1)
-    assert enough_m == exact_m or min(enough_m, exact_m) >= 0.1
-
-
-@given(
-    st.lists(st.tuples(st.integers(30, 95), st.integers(0, 95)), min_size=1, max_size=12),
-    st.integers(40, SIDE),
-    st.floats(-0.5, 2.0),
-    st.floats(-1.5, 1.5),
-    st.floats(-0.5, 2.0),
-    st.sampled_from([(1.0,), (1.3, 0.6, 1.0)]),
-)
-def test_what_is_spared_is_what_the_model_says_step_by_step(
-    posts: list[tuple[int, int]],
-    unseen_from: int,
-    told_m_s: float,
-    turn_rad_s: float,
-    now_m_s: float,
-    gains: tuple[float, ...],
-) -> None:
-    """Two steps of what was told before, twenty of the command, then to a stop; over ground that is not seen, too."""
-    walls = [(row, row + 3, column, column + 2) for row, column in posts]
-    start = Start(5.0, 2.0, 0.3, now_m_s, 0.5 * turn_rad_s)
-    told = problem(*walls, start=start, unseen_from=unseen_from)._replace(pending=np.array([[0.7, -0.4], [0.2, 0.9]]))
-    expected_m, ground = 10.0, told.ground
-    for gain in gains:
-        state, step = tuple(start), 0
-        while step < 22 or abs(state[3]) > 0.02 or abs(state[4]) > 0.02:
-            now = told.pending[step] if step < 2 else (told_m_s, turn_rad_s) if step < 22 else (0.0, 0.0)
-            state, step = moved(state, now[0], gain * now[1], MODEL, 0.1), step + 1
-            clear_m = clearance_m(ground.gap_m, CELL_M, BODY, *state[:3])
-            seen_m = clearance_m(ground.seen_m, CELL_M, BODY, *state[:3], 0.0)
-            expected_m = min(expected_m, clear_m - 0.03 - 0.1 * abs(state[3]), seen_m - 0.03)
-    assert spare_m(told_m_s, turn_rad_s, 2.0, gains, 0.03, 0.1, told) == pytest.approx(expected_m, abs=1e-9)
 
 
 def test_a_child_begins_as_one_parent_and_ends_as_another() -> None:
