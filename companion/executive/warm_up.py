@@ -27,7 +27,7 @@ from companion.core.grid import empty_grid
 from companion.core.own_parts import OwnKind, blamed
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
-from companion.mapping.evidence_map import integrate, new_map, penalise
+from companion.mapping.evidence_map import integrate, move, new_map, penalise
 from companion.mapping.map_queries import clearance_m, look_along, unseen_beside
 from companion.mission.bounds import Bounds
 from companion.perception.object_tracker import ObjectTracker
@@ -51,6 +51,7 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     scan = RangeScan(0.0, bearings, np.array([2.0, np.inf]), 0.2, 4.0, 0.1, "warm-up")
     integrate(evidence, Pose(4.0, 4.0, 0.0, 0.0), scan, 1)
     penalise(evidence, evidence.base.cell_at(NedPoint(1.0, 1.0)), 0.1)
+    move(evidence, 0.0, 0.0)
     look_along(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.5)
     unseen_beside(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.3, 0.5)
     clearance_m(evidence, NedPoint(4.0, 4.0), 1.0)

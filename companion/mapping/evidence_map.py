@@ -12,6 +12,7 @@ Nouns: evidence map, evidence.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -23,13 +24,21 @@ from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, Grid
 from companion.core.scan import WIRED, RangeScan
 from companion.mapping.cell_frame import CellFrame
-from companion.mapping.evidence_kernels import InverseSensorModel, ScanInCells, cast_scan, soften, weigh, weigh_roomy
+from companion.mapping.evidence_kernels import (
+    InverseSensorModel,
+    ScanInCells,
+    cast_scan,
+    soften,
+    weigh,
+    weigh_roomy,
+    written_box,
+)
+from companion.mapping.lazy_zeros import lazy_zeros
 from companion.mapping.sensor_agreement import SensorAgreement
 from companion.settings import MappingSettings
 
-MAX_EVIDENCE_CELLS = 33_000_000
-"""Room for a target 200 m away, on cells of 0.05 m. Cells that no scan has changed take no memory until the whole
-map is moved or restored."""
+MAX_EVIDENCE_CELLS = 101_000_000
+"""Room for a target 350 m away, on cells of 0.05 m. Cells that no scan has changed take no memory."""
 BLIND_M = 0.3
 """Beyond the least range of a wired lidar: what was seen nearer than that may now be too near to give an echo."""
 MAX_SOFT_WEIGHT = 0.9
@@ -77,8 +86,8 @@ def new_map(base: Grid, rover_radius_m: float, settings: MappingSettings) -> Evi
     evidence = EvidenceMap(
         base=base,
         grid=base.with_weights(base.weights.copy()),
-        log_odds=np.zeros(shape, np.float32),
-        stamps=np.zeros(shape, np.int32),
+        log_odds=lazy_zeros(shape, np.float32),
+        stamps=lazy_zeros(shape, np.int32),
         penalty=np.zeros(base.weights.shape, np.float32),
         subdivisions=subdivisions,
         rover_radius_m=rover_radius_m,
@@ -146,7 +155,7 @@ def penalise(evidence: EvidenceMap, cell: Cell, amount: float) -> None:
 
 def forget(evidence: EvidenceMap) -> None:
     """Drop all that was seen (the local frame has moved under it); fences and prior knowledge stay."""
-    evidence.log_odds.fill(0.0)
+    evidence.log_odds[_written(evidence.log_odds)] = 0.0
     evidence.penalty.fill(0.0)
     evidence.agreement.clear()
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
@@ -161,7 +170,10 @@ def move(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[float, f
     by = Cell(round(east_m / side_m), round(north_m / side_m))
     by_fields = Cell(round(by.x / evidence.subdivisions), round(by.y / evidence.subdivisions))
     for raster, shift in ((evidence.log_odds, by), (evidence.stamps, by), (evidence.penalty, by_fields)):
-        raster[:] = shifted(raster, raster.shape, shift)
+        window = _written(raster)
+        seen = raster[window].copy()
+        raster[window] = 0
+        _put(seen, raster, Cell(window[1].start + shift.x, window[0].start + shift.y))
     evidence.agreement.clear()
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
     return by.y * side_m, by.x * side_m
@@ -169,13 +181,33 @@ def move(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[float, f
 
 def shifted(raster: NDArray[Any], shape: tuple[int, ...], by: Cell) -> NDArray[Any]:
     """A raster on another one of this shape, moved by ``by`` to the east and north; zero where it says nothing."""
-    result = np.zeros(shape, raster.dtype)
-    height, width = shape
-    y0, x0 = max(0, by.y), max(0, by.x)
-    y1, x1 = min(height, raster.shape[0] + by.y), min(width, raster.shape[1] + by.x)
-    if y0 < y1 and x0 < x1:
-        result[y0:y1, x0:x1] = raster[y0 - by.y : y1 - by.y, x0 - by.x : x1 - by.x]
+    result, window = lazy_zeros(shape, raster.dtype), _written(raster)
+    _put(raster[window], result, Cell(window[1].start + by.x, window[0].start + by.y))
     return result
+
+
+def _put(part: NDArray[Any], raster: NDArray[Any], at: Cell) -> None:
+    """Write a part of a raster where its south-west cell is ``at``; what lies outside is lost."""
+    rows, columns = part.shape
+    y0, x0 = max(0, at.y), max(0, at.x)
+    y1, x1 = min(raster.shape[0], at.y + rows), min(raster.shape[1], at.x + columns)
+    if y0 < y1 and x0 < x1:
+        raster[y0:y1, x0:x1] = part[y0 - at.y : y1 - at.y, x0 - at.x : x1 - at.x]
+
+
+def _written(raster: NDArray[Any], step: int = 1) -> tuple[slice, slice]:
+    """The rows and columns that hold all that is not zero, widened to whole multiples of ``step``.
+
+    What is not looked at takes no memory, and large maps are mostly unseen.
+    """
+    left, low, right, high = (int(cell) for cell in written_box(raster))
+    if right < left:
+        return slice(0, 0), slice(0, 0)
+    return _steps(low, high, step), _steps(left, right, step)
+
+
+def _steps(first: int, last: int, step: int) -> slice:
+    return slice(first // step * step, (last // step + 1) * step)
 
 
 def rebase(evidence: EvidenceMap, base: Grid) -> None:
@@ -187,7 +219,9 @@ def rebase(evidence: EvidenceMap, base: Grid) -> None:
 def restore(evidence: EvidenceMap, log_odds: NDArray[np.float32], penalty: NDArray[np.float32]) -> None:
     """Take over what an earlier run had seen, and what experience had added; shapes as in the map."""
     settings = evidence.settings
-    np.clip(log_odds, -settings.free_limit, settings.limit, out=evidence.log_odds)
+    evidence.log_odds[_written(evidence.log_odds)] = 0.0
+    window = _written(log_odds)
+    evidence.log_odds[window] = np.clip(log_odds[window], -settings.free_limit, settings.limit)
     np.maximum(penalty, 0.0, out=evidence.penalty)
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
 
@@ -198,18 +232,19 @@ def forget_weak_evidence(evidence: EvidenceMap, point: NedPoint, reach_m: float)
     That is weak evidence of obstacles anywhere (below ``settings.sure_at``), any evidence of obstacles within
     ``reach_m`` of the place, and all penalties. Returns whether there was any.
     """
-    occupied = evidence.log_odds >= evidence.settings.occupied_at
-    doubtful = occupied & (evidence.log_odds < evidence.settings.sure_at)
+    window = _written(evidence.log_odds)
+    seen = evidence.log_odds[window]
+    occupied = seen >= evidence.settings.occupied_at
+    doubtful = occupied & (seen < evidence.settings.sure_at)
     x, y = evidence.frame.xy(point)
+    x, y = x - window[1].start, y - window[0].start
     reach = evidence.frame.cells(reach_m)
-    window = np.s_[
+    near = np.s_[
         max(0, int(y - reach)) : max(0, int(y + reach) + 1), max(0, int(x - reach)) : max(0, int(x + reach) + 1)
     ]
-    doubtful[window] |= occupied[window]
+    doubtful[near] |= occupied[near]
     found = bool(doubtful.any() or (evidence.penalty > 0.0).any())
-    _forget_cells(evidence, doubtful)
-    evidence.penalty.fill(0.0)
-    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+    _forget_cells(evidence, window, doubtful)
     return found
 
 
@@ -218,33 +253,46 @@ def look_again(evidence: EvidenceMap, since_stamp: int) -> None:
 
     The ground becomes unknown, not free: whoever goes there looks first. What the mission itself closed stays.
     """
-    old = (evidence.log_odds >= evidence.settings.occupied_at) & (evidence.stamps < since_stamp)
-    _forget_cells(evidence, old)
+    window = _written(evidence.log_odds)
+    occupied = evidence.log_odds[window] >= evidence.settings.occupied_at
+    _forget_cells(evidence, window, occupied & (evidence.stamps[window] < since_stamp))
+
+
+def _forget_cells(evidence: EvidenceMap, window: tuple[slice, slice], cells: NDArray[np.bool_]) -> None:
+    """These cells of a window are unknown again, and remembered as once seen; all penalties are dropped.
+
+    As once seen count also those that an earlier run saw.
+    """
+    evidence.log_odds[window][cells] = 0.0
+    stamps = evidence.stamps[window]
+    stamps[cells] = np.maximum(stamps[cells], 1)
     evidence.penalty.fill(0.0)
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
 
 
-def _forget_cells(evidence: EvidenceMap, cells: NDArray[np.bool_]) -> None:
-    """They are unknown again, and remembered as once seen, also those that an earlier run saw."""
-    evidence.log_odds[cells] = 0.0
-    evidence.stamps[cells] = np.maximum(evidence.stamps[cells], 1)
-
-
 def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
     """Shape (height, width): True where at least one evidence cell of the field has been seen."""
-    return _fields_with(evidence, evidence.log_odds != 0.0)
+    return _fields_where(evidence, lambda log_odds: log_odds != 0.0)
 
 
 def occupied_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
     """Shape (height, width): True where something was seen in the field itself, however wide the rover is."""
-    return _fields_with(evidence, evidence.log_odds >= evidence.settings.occupied_at)
+    return _fields_where(evidence, lambda log_odds: log_odds >= evidence.settings.occupied_at)
 
 
-def _fields_with(evidence: EvidenceMap, cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _fields_where(
+    evidence: EvidenceMap, holds: Callable[[NDArray[np.float32]], NDArray[np.bool_]]
+) -> NDArray[np.bool_]:
     # Rows of cells first, then every s-th column: ten times as fast as both at once.
     s = evidence.subdivisions
-    rows = np.logical_or.reduce(cells.reshape(evidence.base.height, s, -1), axis=1)
-    return np.asarray(np.logical_or.reduce([rows[:, column::s] for column in range(s)]))
+    rows, columns = _written(evidence.log_odds, s)
+    fields = np.zeros((evidence.base.height, evidence.base.width), np.bool_)
+    cells = holds(evidence.log_odds[rows, columns])
+    if cells.size:
+        of_rows = np.logical_or.reduce(cells.reshape(cells.shape[0] // s, s, -1), axis=1)
+        within = fields[rows.start // s : rows.stop // s, columns.start // s : columns.stop // s]
+        within[:] = np.logical_or.reduce([of_rows[:, column::s] for column in range(s)])
+    return fields
 
 
 def _hit_cells(evidence: EvidenceMap, pose: Pose, scan: RangeScan) -> NDArray[np.int64]:

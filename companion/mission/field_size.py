@@ -16,9 +16,9 @@ STEP_M = 0.05
 RADII = 0.43
 """Where the rover keeps the circle round it clear, the middle of a field must lie in every gap that it should fit
 through. With fields of so many radii a rover of 0.7 m drives through 1.0 m."""
-MOST_FINE, MOST_FINE_PLANNED = 250_000, 1_300_000
+MOST_FINE, MOST_FINE_PLANNED = 250_000, 3_900_000
 """Fields that may be small are so large that there are no more of them: searches take time. The second is for planned
-motions, which search less often."""
+motions, which search less often: nearly as many as a grid may have."""
 ARC_RADII = 0.72
 """The same for a rover that turns in arcs. It needs wider gaps, so smaller fields are of no use."""
 BEAMS_M = 1.0

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from companion.core.frames import NedPoint, Pose
 from companion.core.scan import RangeScan
 from companion.mapping.evidence_map import EvidenceMap
+from companion.mapping.lazy_zeros import lazy_zeros
 from companion.perception.moving_obstacles import Moving
 from companion.settings import TrafficSettings
 
@@ -145,7 +146,7 @@ class ObjectTracker:
 
     def __init__(self, evidence: EvidenceMap) -> None:
         self._evidence = evidence
-        self._free = np.zeros(evidence.log_odds.shape, np.bool_)
+        self._free = lazy_zeros(evidence.log_odds.shape, np.bool_)
         self._tracks: tuple[Track, ...] = ()
         self._numbers = 0
 

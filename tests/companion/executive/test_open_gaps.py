@@ -26,12 +26,15 @@ def test_the_cells_count_that_a_map_has_not_those_that_were_wanted(evidence_m: f
     assert open_gap_m(LONG, evidence) == pytest.approx(gap_m)
 
 
-def test_a_large_map_has_larger_cells_and_closes_more() -> None:
+def test_a_target_340_m_away_is_on_a_map_with_the_gaps_of_one_that_is_near_and_farther_ones_are_not() -> None:
     settings = parse_settings({"guidance": {"controller": "motion-ga"}}, "test")
-    grid = GridSpec(resolution_m=0.25)
-    near, far = (Mission("m", (Target("t", HomePoint(x, x)),), grid=grid, rover=LONG) for x in (9.0, 180.0))
-    gaps_m = [open_gap_m(LONG, map_at_start(one, settings, HOME, narrow_sight=False)) for one in (near, far)]
-    assert max(gaps_m) == gaps_m[1] > finer_gap_m(LONG, settings.mapping, 0.25)
+    grid = GridSpec(by_footprint=True)
+    gaps_m = []
+    for north_m in (9.0, 340.0, 500.0):
+        mission = Mission("m", (Target("t", HomePoint(north_m, 0.0)),), grid=grid, rover=LONG)
+        gaps_m.append(open_gap_m(LONG, map_at_start(mission, settings, HOME, narrow_sight=False)))
+    assert gaps_m[0] == gaps_m[1] == finer_gap_m(LONG, settings.mapping, 0.25) == 0.9
+    assert gaps_m[2] > 1.0
 
 
 def test_beams_and_arcs_are_led_by_points() -> None:

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+import mmap
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import BASE_WEIGHT, Cell, Grid, empty_grid
@@ -17,9 +22,13 @@ from companion.mapping.evidence_map import (
     forget_weak_evidence,
     integrate,
     known_fields,
+    look_again,
+    move,
     new_map,
+    occupied_fields,
     penalise,
     restore,
+    shifted,
 )
 from companion.mapping.map_queries import clearance_m, look_along
 from companion.mapping.sensor_agreement import BELIEVED_S
@@ -376,6 +385,88 @@ def test_clearance_is_the_distance_to_the_nearest_obstacle():
 def test_very_large_maps_get_a_coarser_raster():
     assert new_map(empty_grid(3000, 1500), RADIUS_M, SETTINGS).evidence_m > SETTINGS.evidence_m
     assert new_map(empty_grid(100, 50), RADIUS_M, SETTINGS).evidence_m == SETTINGS.evidence_m
+
+
+CELLS = st.sampled_from([0.0, 0.0, 0.0, -2.0, 0.7, 3.0])
+BY = st.builds(Cell, st.integers(-9, 9), st.integers(-9, 9))
+
+
+@given(arrays(np.float32, st.tuples(st.integers(1, 9), st.integers(1, 9)), elements=CELLS, fill=st.just(0.0)), BY)
+def test_a_shifted_raster_has_each_cell_where_it_belongs_and_nothing_else(cells: np.ndarray, by: Cell) -> None:
+    moved = shifted(cells, (8, 7), by)
+    for y, x in np.ndindex(8, 7):
+        inside = 0 <= y - by.y < cells.shape[0] and 0 <= x - by.x < cells.shape[1]
+        assert moved[y, x] == (cells[y - by.y, x - by.x] if inside else 0.0)
+
+
+@given(arrays(np.float32, (8, 12), elements=CELLS, fill=st.just(0.0)), arrays(np.int32, (8, 12)), BY)
+def test_a_moved_map_has_each_cell_where_it_belongs(cells: np.ndarray, stamps: np.ndarray, by: Cell) -> None:
+    evidence = map_of(cells, stamps)
+    assert move(evidence, 0.25 * by.y, 0.25 * by.x) == (0.25 * by.y, 0.25 * by.x)
+    for now, before in ((evidence.log_odds, cells), (evidence.stamps, stamps)):
+        assert (now == shifted(before, before.shape, by)).all()
+
+
+@given(arrays(np.float32, (8, 12), elements=CELLS, fill=st.just(0.0)), arrays(np.int32, (8, 12)))
+def test_fields_are_known_and_occupied_as_their_cells_are(cells: np.ndarray, stamps: np.ndarray) -> None:
+    evidence = map_of(cells, stamps)
+    known, occupied = known_fields(evidence), occupied_fields(evidence)
+    assert known.shape == occupied.shape == (2, 3)
+    for y, x in np.ndindex(2, 3):
+        own = cells[4 * y : 4 * y + 4, 4 * x : 4 * x + 4]
+        assert known[y, x] == (own != 0.0).any()
+        assert occupied[y, x] == (own >= SETTINGS.occupied_at).any()
+
+
+@given(
+    arrays(np.float32, (8, 12), elements=CELLS, fill=st.just(0.0)),
+    arrays(np.int32, (8, 12), elements=st.integers(0, 9)),
+    st.floats(0.0, 3.0),
+    st.floats(0.0, 2.0),
+)
+def test_what_is_forgotten_is_forgotten_wherever_it_lies(
+    cells: np.ndarray, stamps: np.ndarray, east_m: float, north_m: float
+) -> None:
+    old, doubted, blank = (map_of(cells, stamps) for _ in range(3))
+    obstacle = cells >= SETTINGS.occupied_at
+    look_again(old, 5)
+    assert (old.log_odds == np.where(obstacle & (stamps < 5), 0.0, cells)).all()
+    forget(blank)
+    assert not blank.log_odds.any()
+
+    y, x = np.indices(cells.shape)
+    near = (y >= 4 * north_m - 5) & (y <= 4 * north_m + 4) & (x >= 4 * east_m - 5) & (x <= 4 * east_m + 4)
+    gone = obstacle & ((cells < SETTINGS.sure_at) | near)
+    assert forget_weak_evidence(doubted, NedPoint(north_m, east_m), 1.0) == gone.any()
+    assert (doubted.log_odds == np.where(gone, 0.0, cells)).all()
+    assert (doubted.stamps == np.where(gone, np.maximum(stamps, 1), stamps)).all()
+
+
+def map_of(cells: np.ndarray, stamps: np.ndarray) -> EvidenceMap:
+    evidence = new_map(empty_grid(3, 2), RADIUS_M, SETTINGS.model_copy(update={"evidence_m": 0.25}))
+    evidence.log_odds[:], evidence.stamps[:] = cells, stamps
+    return evidence
+
+
+def test_what_nobody_looked_at_of_a_large_map_takes_no_memory() -> None:
+    """A map of 100 million cells, on which little is seen, moved, forgotten and taken over by another run."""
+    evidence = new_map(empty_grid(2000, 1990, 0.25), RADIUS_M, SETTINGS.model_copy(update={"evidence_m": 0.05}))
+    assert evidence.log_odds.size > 99_000_000
+    here, before_b = Pose(200.0, 200.0, 0.3, 0.0), memory_b()
+    integrate(evidence, here, scan(np.full(len(FULL_CIRCLE), 5.0)), 1)
+    move(evidence, 30.0, -40.0)
+    assert 900 < known_fields(evidence).sum() < 1700
+    kept = shifted(evidence.log_odds, evidence.log_odds.shape, Cell(100, 100))
+    look_again(evidence, 0)
+    forget_weak_evidence(evidence, here.point, 1.0)
+    restore(evidence, kept, evidence.penalty)
+    assert memory_b() - before_b < 100e6
+
+
+def memory_b() -> float:
+    """Of this process, as the system has it."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * float(mmap.PAGESIZE)
 
 
 def test_a_post_that_comes_too_near_for_an_echo_is_not_freed_by_empty_rays() -> None:
