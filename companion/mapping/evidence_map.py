@@ -41,6 +41,9 @@ MAX_EVIDENCE_CELLS = 101_000_000
 """Room for a target 350 m away, on cells of 0.05 m. Cells that no scan has changed take no memory."""
 BLIND_M = 0.3
 """Beyond the least range of a wired lidar: what was seen nearer than that may now be too near to give an echo."""
+Window = tuple[slice, slice]
+"""Rows and columns of a raster."""
+NOTHING: Window = (slice(0, 0), slice(0, 0))
 MAX_SOFT_WEIGHT = 0.9
 """Soft cost never makes a field look like an obstacle."""
 
@@ -93,7 +96,7 @@ def new_map(base: Grid, rover_radius_m: float, settings: MappingSettings) -> Evi
         rover_radius_m=rover_radius_m,
         settings=settings,
     )
-    _refresh(evidence, 0, 0, base.width, base.height)
+    _refresh_all(evidence, NOTHING)
     return evidence
 
 
@@ -158,7 +161,7 @@ def forget(evidence: EvidenceMap) -> None:
     evidence.log_odds[_written(evidence.log_odds)] = 0.0
     evidence.penalty.fill(0.0)
     evidence.agreement.clear()
-    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+    _refresh_all(evidence)
 
 
 def move(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[float, float]:
@@ -175,7 +178,7 @@ def move(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[float, f
         raster[window] = 0
         _put(seen, raster, Cell(window[1].start + shift.x, window[0].start + shift.y))
     evidence.agreement.clear()
-    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+    _refresh_all(evidence)
     return by.y * side_m, by.x * side_m
 
 
@@ -195,14 +198,14 @@ def _put(part: NDArray[Any], raster: NDArray[Any], at: Cell) -> None:
         raster[y0:y1, x0:x1] = part[y0 - at.y : y1 - at.y, x0 - at.x : x1 - at.x]
 
 
-def _written(raster: NDArray[Any], step: int = 1) -> tuple[slice, slice]:
+def _written(raster: NDArray[Any], step: int = 1) -> Window:
     """The rows and columns that hold all that is not zero, widened to whole multiples of ``step``.
 
     What is not looked at takes no memory, and large maps are mostly unseen.
     """
     left, low, right, high = (int(cell) for cell in written_box(raster))
     if right < left:
-        return slice(0, 0), slice(0, 0)
+        return NOTHING
     return _steps(low, high, step), _steps(left, right, step)
 
 
@@ -213,7 +216,7 @@ def _steps(first: int, last: int, step: int) -> slice:
 def rebase(evidence: EvidenceMap, base: Grid) -> None:
     """Other weights of the mission's own (of a grid that lies as before); what was seen stays."""
     evidence.base.weights[:] = base.weights
-    _refresh(evidence, 0, 0, base.width, base.height)
+    _refresh_all(evidence)
 
 
 def restore(evidence: EvidenceMap, log_odds: NDArray[np.float32], penalty: NDArray[np.float32]) -> None:
@@ -223,7 +226,7 @@ def restore(evidence: EvidenceMap, log_odds: NDArray[np.float32], penalty: NDArr
     window = _written(log_odds)
     evidence.log_odds[window] = np.clip(log_odds[window], -settings.free_limit, settings.limit)
     np.maximum(penalty, 0.0, out=evidence.penalty)
-    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+    _refresh_all(evidence)
 
 
 def forget_weak_evidence(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
@@ -258,7 +261,7 @@ def look_again(evidence: EvidenceMap, since_stamp: int) -> None:
     _forget_cells(evidence, window, occupied & (evidence.stamps[window] < since_stamp))
 
 
-def _forget_cells(evidence: EvidenceMap, window: tuple[slice, slice], cells: NDArray[np.bool_]) -> None:
+def _forget_cells(evidence: EvidenceMap, window: Window, cells: NDArray[np.bool_]) -> None:
     """These cells of a window are unknown again, and remembered as once seen; all penalties are dropped.
 
     As once seen count also those that an earlier run saw.
@@ -267,7 +270,7 @@ def _forget_cells(evidence: EvidenceMap, window: tuple[slice, slice], cells: NDA
     stamps = evidence.stamps[window]
     stamps[cells] = np.maximum(stamps[cells], 1)
     evidence.penalty.fill(0.0)
-    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+    _refresh_all(evidence)
 
 
 def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
@@ -354,14 +357,47 @@ def _soft_reach(evidence: EvidenceMap) -> int:
 def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
     """Recompute the weights of the fields x0 <= x < x1, y0 <= y < y1 from the evidence."""
     base = evidence.base
-    settings = evidence.settings
-    x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, base.width), min(y1, base.height)
-    if x0 >= x1 or y0 >= y1:
+    window = max(x0, 0), max(y0, 0), min(x1, base.width), min(y1, base.height)
+    _weigh(evidence, window)
+    _soften(evidence, window)
+
+
+def _refresh_all(evidence: EvidenceMap, seen: Window | None = None) -> None:
+    """Recompute all weights. Evidence counts only near what was ``seen``, and at the edges of the map."""
+    base, s = evidence.base, evidence.subdivisions
+    np.minimum(base.weights + evidence.penalty, 1.0, out=evidence.grid.weights)
+    reach = math.ceil(evidence.rover_radius_m / base.resolution_m) + 1
+    width, height, rim = base.width, base.height, min(reach, base.width, base.height)
+    for window in (
+        (0, 0, width, rim),
+        (0, height - rim, width, height),
+        (0, 0, rim, height),
+        (width - rim, 0, width, height),
+    ):
+        _weigh(evidence, window)
+    rows, columns = _written(evidence.log_odds, s) if seen is None else seen
+    if rows.start < rows.stop:
+        x0, y0 = max(columns.start // s - reach, 0), max(rows.start // s - reach, 0)
+        _weigh(evidence, (x0, y0, min(columns.stop // s + reach, width), min(rows.stop // s + reach, height)))
+    _soften(evidence, (0, 0, width, height))
+
+
+def _weigh(evidence: EvidenceMap, window: tuple[int, int, int, int]) -> None:
+    """The weights of the fields x0 <= x < x1, y0 <= y < y1 without soft cost."""
+    if window[0] >= window[2] or window[1] >= window[3]:
         return  # the rover is off the map, and sees nothing of it
-    weights, reach = evidence.grid.weights, base.fields(settings.soft_reach_m)
+    settings = evidence.settings
     radius = evidence.rover_radius_m / evidence.evidence_m
-    window = (x0, y0, x1, y1)
     roomy = settings.keeps == "outline" and evidence.subdivisions * math.sqrt(2.0) <= radius
     weighs = weigh_roomy if roomy else weigh
-    weighs(evidence.log_odds, base.weights, evidence.penalty, weights, window, settings.occupied_at, radius)
-    soften(weights, window, reach, settings.soft_cost, MAX_SOFT_WEIGHT)
+    weighs(
+        evidence.log_odds, evidence.base.weights, evidence.penalty, evidence.grid.weights, window,
+        settings.occupied_at, radius,
+    )  # fmt: skip
+
+
+def _soften(evidence: EvidenceMap, window: tuple[int, int, int, int]) -> None:
+    if window[0] < window[2] and window[1] < window[3]:
+        settings = evidence.settings
+        reach = evidence.base.fields(settings.soft_reach_m)
+        soften(evidence.grid.weights, window, reach, settings.soft_cost, MAX_SOFT_WEIGHT)

@@ -16,7 +16,9 @@ from hypothesis.extra.numpy import arrays
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import BASE_WEIGHT, Cell, Grid, empty_grid
 from companion.core.scan import WIRED, RangeScan
+from companion.mapping.evidence_kernels import soften, weigh, weigh_roomy
 from companion.mapping.evidence_map import (
+    MAX_SOFT_WEIGHT,
     EvidenceMap,
     forget,
     forget_weak_evidence,
@@ -504,5 +506,16 @@ def test_after_every_scan_the_weights_are_those_of_a_map_that_is_computed_anew(f
         again = new_map(evidence.base, RADIUS_M, settings)
         restore(again, evidence.log_odds, evidence.penalty)
         assert np.array_equal(evidence.grid.weights, again.grid.weights)
+        assert np.array_equal(again.grid.weights, weights_of_all_evidence(again))
         obstacles.append(int((evidence.grid.weights >= 1.0).sum()))
     assert len(set(obstacles)) > 10
+
+
+def weights_of_all_evidence(evidence: EvidenceMap) -> np.ndarray:
+    """By the kernels alone, with no thought of what was seen."""
+    settings, whole = evidence.settings, (0, 0, evidence.base.width, evidence.base.height)
+    weights, radius = np.zeros(evidence.base.weights.shape), evidence.rover_radius_m / evidence.evidence_m
+    weighs = weigh_roomy if settings.keeps == "outline" else weigh
+    weighs(evidence.log_odds, evidence.base.weights, evidence.penalty, weights, whole, settings.occupied_at, radius)
+    soften(weights, whole, evidence.base.fields(settings.soft_reach_m), settings.soft_cost, MAX_SOFT_WEIGHT)
+    return weights
