@@ -39,8 +39,10 @@ class Standstill:
         """When it last rolled faster than ``STANDS_FIRST_M_S``."""
         self._rolled_s, self._rolled_way = -math.inf, 1.0
         """When it rolled last, and the sign of its speed then."""
+        self._sent_s, self._sent_way = -math.inf, 1.0
+        """When it was told to go last, and which way."""
         self._told_s, self._onward = -math.inf, 1.0
-        """When it was told to stand last, and the sign of its speed when that began."""
+        """When it was told to stand last, and which way it went when that began."""
 
     def note(self, view: LocalView) -> None:
         """How the rover rolls now."""
@@ -63,7 +65,9 @@ class Standstill:
     def against_roll_m_s(self, view: LocalView) -> float:
         """What a rover that is to stand may be told to go against its roll; 0 where it does not roll the other way."""
         if self._now_s - self._told_s > STOOD_S:
-            self._onward = math.copysign(1.0, view.forward_m_s)
+            # It may have rolled back already when it was told to go on. Others may have led it, and made it roll.
+            was_led = self._now_s - self._sent_s <= STOOD_S
+            self._onward = self._sent_way if was_led else math.copysign(1.0, view.forward_m_s)
         self._told_s = self._now_s
         rolls_back = -self._onward * view.forward_m_s > STANDS_FIRST_M_S
         return self._onward * AGAINST_ROLL_M_S if rolls_back and not _brakes_at_once(view) else 0.0
@@ -71,6 +75,8 @@ class Standstill:
     def told(self, speed_m_s: float, view: LocalView, *, guarded: bool) -> None:
         """What the rover is told in this tick."""
         self._waits = self.is_needed_for(speed_m_s, view, guarded=guarded)
+        if speed_m_s != 0.0:
+            self._sent_s, self._sent_way = self._now_s, math.copysign(1.0, speed_m_s)
 
 
 def _brakes_at_once(view: LocalView) -> bool:

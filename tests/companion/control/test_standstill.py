@@ -45,3 +45,19 @@ def test_only_a_roll_the_other_way_is_gone_against_while_it_is_told_to_stand(way
         stands.note(at)
         found.append(stands.against_roll_m_s(at))
     assert found == [0.0, 0.0, 0.0, 0.2 * way, 0.0, 0.0], "at last others had led it meanwhile"
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@pytest.mark.parametrize(("sent_s", "against_m_s"), [(0.3, 0.2), (-0.1, 0.0)])
+def test_a_roll_against_what_it_was_just_told_is_gone_against_at_once(
+    way: float, sent_s: float, against_m_s: float
+) -> None:
+    """It rolled back while it was told to creep on. What it was told long ago says nothing: others led it since."""
+    stands, found = Standstill(), []
+    for time_s, told_m_s in ((sent_s, 0.2), (0.35, 0.0), (0.4, 0.0)):
+        at = view(time_s, -0.3 * way)
+        stands.note(at)
+        if told_m_s == 0.0:
+            found.append(stands.against_roll_m_s(at))
+        stands.told(told_m_s * way, at, guarded=True)
+    assert found == [against_m_s * way] * 2
