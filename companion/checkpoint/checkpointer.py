@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+import numpy as np
+
 from companion.checkpoint.resume import PreviousRun, clock_ahead_s, resume_mission
 from companion.checkpoint.state_format import (
     MAX_DURATION_S,
@@ -259,13 +261,17 @@ class Checkpointer:
 
 
 def _rows(evidence: EvidenceMap) -> Iterator[tuple[RowBand, Raster]]:
-    """The map in bands of rows, each copied when it is asked for: the last may be seconds newer than the first."""
+    """The map in bands of rows, each copied when it is asked for: the last may be seconds newer than the first.
+
+    Rows of which nothing was seen are the same zeros: large maps are mostly that.
+    """
     for name, raster in (("log_odds", evidence.log_odds), ("penalty", evidence.penalty)):
         height, width = raster.shape
         step = max(1, BAND_CELLS // width)
+        unseen = np.zeros((step, width), raster.dtype)
         for row in range(0, height, step):
-            rows = raster[row : row + step].copy()
-            yield RowBand(name, row, len(rows)), rows
+            rows = raster[row : row + step]
+            yield RowBand(name, row, len(rows)), rows.copy() if rows.any() else unseen[: len(rows)]
 
 
 def saved_state(snapshot: Snapshot) -> SavedState:

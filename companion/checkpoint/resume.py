@@ -141,10 +141,7 @@ def resumed_layout(
     cell_shift = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
     log_odds = shifted(previous.rasters["log_odds"], evidence.log_odds.shape, cell_shift)
     penalty = shifted(previous.rasters["penalty"], evidence.penalty.shape, shift)
-    if not same:
-        log_odds = np.where(log_odds >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
-        penalty = np.zeros_like(penalty)
-    restore(evidence, log_odds, penalty)
+    restore(evidence, log_odds, penalty if same else np.zeros_like(penalty), obstacles_alone=not same)
     text = "with its map" if same else "with the obstacles of its map: what was free is looked at anew"
     return layout, progress, text
 

@@ -24,6 +24,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from companion.executive.command_progress import CommandResult
 from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mapping.evidence_map import MAX_EVIDENCE_CELLS
+from companion.mapping.lazy_zeros import lazy_zeros
 from companion.mission.check import MAX_GRID_FIELDS
 from companion.safety.mode_latch import Control
 from companion.storage.validation import first_fault
@@ -310,7 +311,7 @@ def _decode_body(rest: bytes) -> tuple[SavedState, dict[str, Raster]]:
     state = SavedState.model_validate(head["state"])
     ground = state.ground
     fine = (ground.height * ground.subdivisions, ground.width * ground.subdivisions)
-    rasters = {"log_odds": np.zeros(fine, np.float32), "penalty": np.zeros((ground.height, ground.width), np.float32)}
+    rasters = {"log_odds": lazy_zeros(fine, np.float32), "penalty": np.zeros((ground.height, ground.width), np.float32)}
     for raster, first_row, rows, size in head["bands"]:
         _fill(rasters[raster], first_row, rows, rest[start : start + size])
         start += size
@@ -326,7 +327,8 @@ def _fill(raster: Raster, first_row: int, rows: int, data: bytes) -> None:
     values = np.frombuffer(_decompressed(data, rows * width * 4), "<f4")
     if not np.isfinite(values).all():
         raise ValueError("the map contains NaN or infinity")
-    raster[first_row : first_row + rows] = values.reshape(rows, width)
+    if values.any():  # rows of zeros take no memory
+        raster[first_row : first_row + rows] = values.reshape(rows, width)
 
 
 def _decompressed(data: bytes, max_bytes: int) -> bytes:

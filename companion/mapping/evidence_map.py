@@ -219,12 +219,25 @@ def rebase(evidence: EvidenceMap, base: Grid) -> None:
     _refresh_all(evidence)
 
 
-def restore(evidence: EvidenceMap, log_odds: NDArray[np.float32], penalty: NDArray[np.float32]) -> None:
-    """Take over what an earlier run had seen, and what experience had added; shapes as in the map."""
+def restore(
+    evidence: EvidenceMap,
+    log_odds: NDArray[np.float32],
+    penalty: NDArray[np.float32],
+    *,
+    obstacles_alone: bool = False,
+) -> None:
+    """Take over what an earlier run had seen, and what experience had added; shapes as in the map.
+
+    ``obstacles_alone``: no ground counts as seen free, and obstacles keep the least evidence that still makes them
+    obstacles.
+    """
     settings = evidence.settings
     evidence.log_odds[_written(evidence.log_odds)] = 0.0
     window = _written(log_odds)
-    evidence.log_odds[window] = np.clip(log_odds[window], -settings.free_limit, settings.limit)
+    seen = np.clip(log_odds[window], -settings.free_limit, settings.limit)
+    if obstacles_alone:
+        seen = np.where(seen >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
+    evidence.log_odds[window] = seen
     np.maximum(penalty, 0.0, out=evidence.penalty)
     _refresh_all(evidence)
 

@@ -243,4 +243,6 @@ def test_a_large_map_is_copied_in_parts_of_a_megabyte() -> None:
     assert all(rows.size <= BAND_CELLS for _, rows in bands) and len(bands) > 10
     fine = [(place, rows) for place, rows in bands if place.raster == "log_odds"]
     assert np.array_equal(np.concatenate([rows for _, rows in fine]), evidence.log_odds)
+    unseen = [rows for place, rows in bands if place.raster == "penalty"]
+    assert len(unseen) > 1 and np.shares_memory(unseen[0], unseen[1]) and not unseen[0].any(), "no memory for each"
     assert [place.first_row for place, _ in fine] == list(np.cumsum([0, *[place.rows for place, _ in fine]])[:-1])
