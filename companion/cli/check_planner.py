@@ -73,9 +73,6 @@ def _made(name: str) -> Planner:
     except UnknownPlannerError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    except SystemExit as error:
-        typer.echo(f"planner {name!r:.80} cannot be loaded: it ended with SystemExit: {error}", err=True)
-        raise typer.Exit(EXIT_BAD_INPUT) from error
 
 
 def _judged(name: str, planner: Planner, problem: PlanningProblem, budget: Budget, number: int) -> tuple[str, bool]:

@@ -10,6 +10,7 @@ import typer
 
 from companion.cli.entry import EXIT_STOPPED
 from companion.cli.source import Stoppable
+from companion.core.interrupts import SignalExit
 from companion.safety.reasons import EndReason
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -39,7 +40,7 @@ class StopSignals:
     @listener.setter
     def listener(self, listener: Stoppable | None) -> None:
         if self.asked and self._listener is None:
-            raise SystemExit(EXIT_STOPPED)
+            raise SignalExit(EXIT_STOPPED)
         self._listener = listener
 
     def __enter__(self) -> StopSignals:
@@ -66,4 +67,4 @@ class StopSignals:
         self._again = threading.Timer(AGAIN_S, signal.raise_signal, (number,))
         self._again.daemon = True
         self._again.start()
-        raise SystemExit(EXIT_STOPPED)
+        raise SignalExit(EXIT_STOPPED)

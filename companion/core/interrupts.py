@@ -13,14 +13,18 @@ NUMBERS = (signal.SIGINT, signal.SIGTERM)
 Handler = Callable[[int, FrameType | None], object]
 
 
+class SignalExit(SystemExit):
+    """A signal asked for the end of the program. What else ends it with SystemExit is somebody's fault."""
+
+
 def is_interrupt(error: BaseException | None) -> bool:
-    """Whether a KeyboardInterrupt is behind this error, however many others lie between.
+    """Whether a KeyboardInterrupt or a SignalExit is behind this error, however many others lie between.
 
     An interrupt inside a compiled loop comes out as one SystemError, or as several.
     """
     seen: set[int] = set()
     while error is not None and id(error) not in seen:
-        if isinstance(error, KeyboardInterrupt):
+        if isinstance(error, KeyboardInterrupt | SignalExit):
             return True
         seen.add(id(error))
         error = error.__cause__ or error.__context__

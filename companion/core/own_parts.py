@@ -61,7 +61,9 @@ def own_part(kind: OwnKind, name: str) -> Any:
             if not points:
                 return None
             found = points[0].load()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
+        if is_interrupt(error):
+            raise
         raise OwnPartError(f"{kind} {name!r:.80} cannot be loaded: {_reason(error)}") from error
     if not callable(found):
         raise OwnPartError(f"{kind} {name!r:.80} is no class or function that makes a {kind}")
@@ -73,7 +75,9 @@ def made_by(kind: OwnKind, name: str, needs: tuple[str, ...], *given: object) ->
     factory = own_part(kind, name)
     try:
         made = factory(*given)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
+        if is_interrupt(error):
+            raise
         raise OwnPartError(f"{kind} {name!r:.80} cannot be made: {raised(kind, name, error)}") from error
     missing = [part for part in needs if not hasattr(made, part)]
     if missing:
@@ -86,7 +90,7 @@ def blamed(kind: OwnKind, name: str) -> Iterator[None]:
     """A context in which this part works: if it is one's own, what goes wrong is its own fault. Raises OwnPartError."""
     try:
         yield
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # one that ends the program would end a drive without a word
         if is_interrupt(error) or not looks_own(kind, name):
             raise
         raise OwnPartError(f"{kind} {name!r:.80} fails: {raised(kind, name, error)}") from error

@@ -21,6 +21,7 @@ from companion.control.stuck_recovery import StuckRecovery
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
 from companion.core.grid import Cell
+from companion.core.own_parts import OwnKind, blamed
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.evidence_map import forget_weak_evidence
 from companion.mission.resolve import ResolvedTarget
@@ -227,7 +228,8 @@ class GoalDriver:
             return STANDSTILL
         on_path = advanced(self.path, view.pose)
         self.path = rejoined(on_path, view.pose.point, view.evidence, view.rover.radius_m)
-        command = self._controller.follow(self.path, self._at_planned_speed(self.path, view))
+        with blamed(OwnKind.CONTROLLER, view.settings.guidance.controller):
+            command = self._controller.follow(self.path, self._at_planned_speed(self.path, view))
         if self._recovery.is_stuck(view, command):
             self._get_unstuck(view)
         return command

@@ -14,6 +14,7 @@ from numpy.random import Generator
 from companion.core.clock import stopwatch_s
 from companion.core.frames import Pose, wrap_pi_rad
 from companion.core.grid import OBSTACLE, Cell, Grid, Weights
+from companion.core.own_parts import OwnKind, blamed
 from companion.core.rover_limits import RoverLimits
 from companion.navigation.field_step import SearchKind
 from companion.planning.planner import Planner
@@ -66,18 +67,17 @@ class PathSearcher:
     ) -> PlanResult:
         """One search over ``weights``, which are not changed.
 
-        The start is treated as free even if the map has an obstacle there, because the rover is in it.
+        The start is treated as free even if the map has an obstacle there, because the rover is in it. Raises
+        OwnPartError for a planner of one's own that fails.
         """
         began_s = stopwatch_s()
         if weights[start.y, start.x] >= OBSTACLE:
             weights = np.array(weights)
             weights[start.y, start.x] = START_WEIGHT
         budget = budget_of(settings.thorough if kind is SearchKind.THOROUGH else settings.quick)
-        result = self.planner.plan(
-            PlanningProblem(weights, start, target, moving_obstacles=moving_obstacles, kinematics=kinematics),
-            budget,
-            self.rng,
-        )
+        problem = PlanningProblem(weights, start, target, moving_obstacles=moving_obstacles, kinematics=kinematics)
+        with blamed(OwnKind.PLANNER, settings.planner):
+            result = self.planner.plan(problem, budget, self.rng)
         self.seconds.append(stopwatch_s() - began_s)
         self.by_curves += result.path is not None and result.control_points > 0
         return result

@@ -132,6 +132,7 @@ def drive(
                         start_us=RECORD_START_US,
                         lidars=[one.text for one in lidars],
                     )
+                context.call_on_close(recorder.close)  # also where a part of one's own fails on the way
             with console.status("loading the planner ..."):
                 _say_if_compiling(settings, mission)
                 run = Drive(

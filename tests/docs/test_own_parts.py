@@ -65,6 +65,22 @@ def test_the_planner_of_the_page_drives(lines: str, tmp_path: Path) -> None:
     assert replayed.exit_code == 0 and "differences: none" in replayed.output, replayed.output
 
 
+@pytest.mark.parametrize("fails", ['raise ValueError("my bug")', "raise SystemExit(0)"])
+def test_a_planner_that_fails_on_the_way_ends_the_drive_with_one_line(lines: str, fails: str) -> None:
+    """By itself SystemExit(0) would end it as if every target had been reached. Three searches go well, two of them at
+    the start."""
+    text = Path("lines.py").read_text(encoding="utf-8")
+    late = f"Lines.calls = getattr(Lines, 'calls', 0) + 1\n        if Lines.calls > 3: {fails}\n        fields = poly"
+    Path("lines.py").write_text(text.replace("fields = poly", late), encoding="utf-8")
+    mission = str(MAPS.parent / "first-drive" / "five-metres.toml")
+    driven = CliRunner().invoke(sitl, ["drive", mission, "--planner", lines, "--record", "rec"])
+    assert isinstance(driven.exception, OwnPartError), driven.output
+    error = fails.removeprefix("raise ").replace('("', ": ").replace('")', "").replace("(0)", ": 0")
+    assert re.fullmatch(rf"planner 'lines:Lines' fails: {error} \(lines.py, line \d+\)", str(driven.exception))
+    replayed = CliRunner().invoke(app, ["replay", "rec"])
+    assert "tick" in replayed.output, replayed.output
+
+
 @pytest.mark.parametrize(
     "command", [(sitl, "drive", []), (app, "run", ["--connect", "udpin:127.0.0.1:0", "--state", "state"])]
 )
@@ -99,7 +115,7 @@ def test_a_planner_that_ends_the_program_is_told_in_one_line_with_the_problem(li
     Path("lines.py").write_text("raise SystemExit(0)\n")
     told = CliRunner().invoke(app, ["check-planner", lines])
     assert told.exit_code == 2
-    assert told.output == "planner 'lines:Lines' cannot be loaded: it ended with SystemExit: 0\n"
+    assert told.output == "planner 'lines:Lines' cannot be loaded: SystemExit: 0\n"
 
 
 def test_a_planner_that_never_finds_a_path_is_told_with_the_first_problem(lines: str) -> None:

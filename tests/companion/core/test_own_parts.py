@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from companion.core.interrupts import SignalExit
 from companion.core.own_parts import OwnKind, OwnPartError, blamed, made_by
 
 
@@ -35,3 +36,10 @@ def test_what_fails_in_one_of_the_programs_own_stays_as_it_is() -> None:
 def test_an_interrupt_is_nobodys_fault() -> None:
     with pytest.raises(KeyboardInterrupt), blamed(OwnKind.CONTROLLER, "dice:Dice"):
         raise KeyboardInterrupt
+
+
+def test_a_part_that_ends_the_program_fails_but_a_signal_ends_it() -> None:
+    with pytest.raises(OwnPartError, match="SystemExit: 0"), blamed(OwnKind.CONTROLLER, "dice:Dice"):
+        raise SystemExit(0)
+    with pytest.raises(SignalExit), blamed(OwnKind.CONTROLLER, "dice:Dice"):
+        raise SignalExit(130)
