@@ -253,15 +253,17 @@ def forget_weak_evidence(evidence: EvidenceMap, point: NedPoint, reach_m: float)
     occupied = seen >= evidence.settings.occupied_at
     doubtful = occupied & (seen < evidence.settings.sure_at)
     x, y = evidence.frame.xy(point)
-    x, y = x - window[1].start, y - window[0].start
     reach = evidence.frame.cells(reach_m)
-    near = np.s_[
-        max(0, int(y - reach)) : max(0, int(y + reach) + 1), max(0, int(x - reach)) : max(0, int(x + reach) + 1)
-    ]
+    near = _round(y, reach, window[0].start), _round(x, reach, window[1].start)
     doubtful[near] |= occupied[near]
     found = bool(doubtful.any() or (evidence.penalty > 0.0).any())
     _forget_cells(evidence, window, doubtful)
     return found
+
+
+def _round(place: float, reach: float, first: int) -> slice:
+    """The cells within reach of a place along one axis, counted from the ``first`` of a window."""
+    return slice(max(0, int(place - reach) - first), max(0, int(place + reach) + 1 - first))
 
 
 def look_again(evidence: EvidenceMap, since_stamp: int) -> None:
