@@ -146,3 +146,48 @@ def test_what_is_spared_is_what_the_model_says_step_by_step(
             seen_m = clearance_m(ground.seen_m, CELL_M, BODY, *state[:3], 0.0)
             expected_m = min(expected_m, clear_m - 0.03 - 0.1 * abs(state[3]), seen_m - 0.03)
     assert spare_m(told_m_s, turn_rad_s, 2.0, gains, 0.03, 0.1, told) == pytest.approx(expected_m, abs=1e-9)
+
+
+@pytest.mark.parametrize(("before_m_s", "turn_rad_s"), [(2.0, 0.0), (2.0, 1.5), (0.0, 1.5)])
+def test_no_look_is_left_out_where_a_long_rover_turns_or_has_been_told_to_go_faster(
+    before_m_s: float, turn_rad_s: float
+) -> None:
+    """Told to stand, it first does what it was told before; walls ahead and beside it, at every distance."""
+    long = BODY._replace(ahead_m=np.array([-0.6, -0.2, 0.2, 0.6]), around_m=0.85)
+    for near in range(4, 30):
+        for wall in ((20 + near, 22 + near, 0, SIDE), (0, SIDE, 50 + near, 52 + near)):
+            told = problem(wall)._replace(body=long, pending=np.tile((before_m_s, turn_rad_s), (12, 1)))
+            for margin_s in (0.0, 0.3):
+                given = (0.0, turn_rad_s, 1.0, (1.0,), 0.03, margin_s, told)
+                exact_m = spare_m(*given)
+                assert may_be_last(*given) is (exact_m >= 0.0), (near, wall, margin_s)
+                enough_m = spare_m(*given, -math.inf, 0.1)
+                assert enough_m == exact_m or min(enough_m, exact_m) >= 0.1, (near, wall, margin_s)
+
+
+def test_a_rover_that_gathers_speed_before_the_command_is_followed_until_it_stands() -> None:
+    """At 2 m/s it needs 4 m and 40 steps, though it is told to stand and stands now."""
+    slow_to_stop = MODEL._replace(accel_m_s2=20.0, decel_m_s2=0.5)
+    told = problem()._replace(model=slow_to_stop, pending=np.tile((2.0, 0.0), (4, 1)))
+    assert may_be_last(0.0, 0.0, 0.3, (1.0,), 0.03, 0.05, told)
+    wall = problem((62, 64, 0, SIDE))._replace(model=slow_to_stop, pending=told.pending)
+    assert not may_be_last(0.0, 0.0, 0.3, (1.0,), 0.03, 0.05, wall)
+
+
+def test_a_rover_that_turns_more_than_told_is_followed_until_it_turns_no_more() -> None:
+    """At 3 rad/s instead of 1.5 that takes 10 s, not 5 s."""
+    slow_to_turn = problem()._replace(model=MODEL._replace(turn_accel_rad_s2=0.3))
+    assert may_be_last(0.0, 1.5, 12.0, (2.0,), 0.03, 0.05, slow_to_turn)
+
+
+def test_the_fastest_speed_that_may_be_told_is_found_to_a_fine_step() -> None:
+    found = set()
+    for row in range(28, 60):
+        ground = problem((row, row + 2, 0, SIDE))
+        (speed_m_s, _), *_ = admitted_speeds(np.array([0.0]), 3.0, (1.0,), 0.03, 0.05, ground)
+        if 0.0 < speed_m_s < MODEL.fastest_m_s:
+            found.add(float(speed_m_s))
+            faster_m_s = MODEL.fastest_m_s * (math.sqrt(speed_m_s / MODEL.fastest_m_s) + 1.0 / 80.0) ** 2
+            assert may_be_last(speed_m_s, 0.0, 3.0, (1.0,), 0.03, 0.05, ground)
+            assert not may_be_last(faster_m_s, 0.0, 3.0, (1.0,), 0.03, 0.05, ground), row
+    assert len(found) > 10

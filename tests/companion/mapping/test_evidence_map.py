@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import mmap
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,6 +30,7 @@ from companion.mapping.evidence_map import (
     new_map,
     occupied_fields,
     penalise,
+    rebase,
     restore,
     shifted,
 )
@@ -444,6 +446,98 @@ def test_what_is_forgotten_is_forgotten_wherever_it_lies(
     assert (doubted.stamps == np.where(gone, np.maximum(stamps, 1), stamps)).all()
 
 
+WEIGHTS = st.sampled_from([BASE_WEIGHT, BASE_WEIGHT, 0.5, 1.0])
+PENALTIES = st.sampled_from([0.0, 0.0, 0.3, 1.5])
+
+
+@given(
+    st.data(),
+    st.tuples(st.integers(1, 12), st.integers(1, 12)),
+    st.sampled_from([1, 2, 4]),
+    st.floats(0.0, 3.0),
+    st.sampled_from(["circle", "outline"]),
+)
+def test_weights_are_those_of_all_evidence_wherever_it_lies(
+    data: st.DataObject, shape: tuple[int, int], subdivisions: int, radius_m: float, keeps: str
+) -> None:
+    """Much or little of it, on maps of any size, also smaller than the rover; with ground that costs more."""
+    settings = SETTINGS.model_copy(update={"keeps": keeps, "evidence_m": 1.0 / subdivisions, "soft_reach_m": 1.0})
+    base = data.draw(arrays(np.float64, shape, elements=WEIGHTS, fill=st.just(BASE_WEIGHT)))
+    cells = tuple(subdivisions * side for side in shape)
+    seen = data.draw(arrays(np.float32, cells, elements=CELLS, fill=st.just(0.0)))
+    penalty = data.draw(arrays(np.float32, shape, elements=PENALTIES, fill=st.just(0.0)))
+    evidence = new_map(Grid(base), radius_m, settings)
+    assert np.array_equal(evidence.grid.weights, weights_of_all_evidence(evidence)), "nothing is seen yet"
+    restore(evidence, seen, penalty)
+    assert np.array_equal(evidence.grid.weights, weights_of_all_evidence(evidence))
+    move(evidence, *data.draw(st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0))))
+    assert np.array_equal(evidence.grid.weights, weights_of_all_evidence(evidence))
+
+
+def test_a_lone_obstacle_closes_the_fields_round_it_on_all_sides() -> None:
+    """Far from the edges of the map, where alone evidence counts otherwise than near what was seen."""
+    evidence = new_map(empty_grid(31, 31), 4.0, SETTINGS.model_copy(update={"evidence_m": 1.0, "soft_cost": 0.0}))
+    cells = np.zeros((31, 31), np.float32)
+    cells[15, 15] = 3.0
+    restore(evidence, cells, np.zeros((31, 31), np.float32))
+    y, x = np.indices(cells.shape)
+    assert np.array_equal(evidence.grid.weights >= 1.0, np.hypot(y - 15, x - 15) < 4.0)
+
+
+def test_what_costs_more_by_experience_costs_more_where_nothing_was_seen() -> None:
+    evidence = new_map(empty_grid(31, 31), RADIUS_M, SETTINGS.model_copy(update={"soft_cost": 0.0}))
+    penalise(evidence, Cell(15, 15), 0.2)
+    penalise(evidence, Cell(20, 15), 2.0)
+    move(evidence, 0.0, 0.0)
+    expected = np.full((31, 31), BASE_WEIGHT)
+    expected[15, 15], expected[15, 20] = BASE_WEIGHT + np.float32(0.2), 1.0
+    assert evidence.grid.weights == pytest.approx(expected)
+
+
+def test_what_costs_more_by_experience_moves_by_whole_fields() -> None:
+    evidence = new_map(empty_grid(12, 12), RADIUS_M, SETTINGS.model_copy(update={"evidence_m": 0.25}))
+    penalise(evidence, Cell(6, 6), 0.2)
+    assert move(evidence, 2.75, -1.25) == (2.75, -1.25)
+    assert np.argwhere(evidence.penalty).tolist() == [[9, 5]]
+
+
+def test_a_map_that_is_taken_over_replaces_what_was_seen_and_keeps_within_the_limits() -> None:
+    evidence = new_map(empty_grid(6, 6), RADIUS_M, SETTINGS.model_copy(update={"evidence_m": 1.0}))
+    evidence.log_odds[0, 0] = evidence.log_odds[3, 3] = 2.0
+    cells, penalty = np.zeros((6, 6), np.float32), np.zeros((6, 6), np.float32)
+    cells[2, 2:5], penalty[1, :2] = (-50.0, 0.7, 50.0), (-1.0, 0.4)
+    restore(evidence, cells, penalty)
+    expected = np.zeros((6, 6), np.float32)
+    expected[2, 2:5] = -SETTINGS.free_limit, 0.7, SETTINGS.limit
+    assert np.array_equal(evidence.log_odds, expected)
+    assert np.array_equal(evidence.penalty, np.maximum(penalty, 0.0))
+
+
+def test_other_ground_of_the_missions_own_counts_at_once() -> None:
+    evidence = new_map(empty_grid(20, 20), RADIUS_M, SETTINGS)
+    closed = empty_grid(20, 20)
+    closed.weights[10, 10] = 1.0
+    rebase(evidence, closed)
+    assert np.array_equal(evidence.grid.weights, new_map(closed, RADIUS_M, SETTINGS).grid.weights)
+    assert evidence.grid.weights[10, 10] == 1.0
+
+
+@pytest.mark.parametrize("drop", [forget, lambda evidence: look_again(evidence, 0)])
+def test_what_experience_added_is_dropped_with_what_was_seen(drop: Callable[[EvidenceMap], None]) -> None:
+    evidence = new_map(empty_grid(20, 20), RADIUS_M, SETTINGS)
+    before = evidence.grid.weights.copy()
+    penalise(evidence, Cell(10, 10), 0.3)
+    drop(evidence)
+    assert not evidence.penalty.any() and np.array_equal(evidence.grid.weights, before)
+
+
+def test_what_experience_added_alone_is_a_reason_to_look_again_once() -> None:
+    evidence = new_map(empty_grid(20, 20), RADIUS_M, SETTINGS)
+    penalise(evidence, Cell(10, 10), 0.3)
+    assert forget_weak_evidence(evidence, NedPoint(1.0, 1.0), 1.0)
+    assert not evidence.penalty.any() and not forget_weak_evidence(evidence, NedPoint(1.0, 1.0), 1.0)
+
+
 def map_of(cells: np.ndarray, stamps: np.ndarray) -> EvidenceMap:
     evidence = new_map(empty_grid(3, 2), RADIUS_M, SETTINGS.model_copy(update={"evidence_m": 0.25}))
     evidence.log_odds[:], evidence.stamps[:] = cells, stamps
@@ -515,7 +609,8 @@ def weights_of_all_evidence(evidence: EvidenceMap) -> np.ndarray:
     """By the kernels alone, with no thought of what was seen."""
     settings, whole = evidence.settings, (0, 0, evidence.base.width, evidence.base.height)
     weights, radius = np.zeros(evidence.base.weights.shape), evidence.rover_radius_m / evidence.evidence_m
-    weighs = weigh_roomy if settings.keeps == "outline" else weigh
+    fine = evidence.subdivisions * math.sqrt(2.0) <= radius
+    weighs = weigh_roomy if settings.keeps == "outline" and fine else weigh
     weighs(evidence.log_odds, evidence.base.weights, evidence.penalty, weights, whole, settings.occupied_at, radius)
     soften(weights, whole, evidence.base.fields(settings.soft_reach_m), settings.soft_cost, MAX_SOFT_WEIGHT)
     return weights
