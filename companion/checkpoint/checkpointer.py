@@ -10,13 +10,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-import numpy as np
-
 from companion.checkpoint.resume import PreviousRun, clock_ahead_s, resume_mission
 from companion.checkpoint.state_format import (
     MAX_DURATION_S,
+    MapPart,
     Raster,
-    RowBand,
     SavedCommands,
     SavedCommandTally,
     SavedEstimate,
@@ -55,7 +53,7 @@ SAVE_INTERVAL_S = 5.0
 """Interval between saves while the rover moves. A change of the mission, mode or arming is saved immediately."""
 SAVE_DISTANCE_M = 0.3
 UNSAVED = "The state cannot be saved: no --resume from here"
-BAND_CELLS = 250_000
+TICK_CELLS = 250_000
 """How much of the map is copied in one tick (1 MB). Larger maps take several ticks."""
 
 Condition = tuple[MissionProgress, Control, bool, bool, bool]
@@ -111,9 +109,9 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StateUpdate:
-    """What changed: copied rows of the map (``new_map``: all older rows are void). A snapshot asks for a write."""
+    """What changed: copied parts of the map (``new_map``: all older ones are void). A snapshot asks for a write."""
 
-    rows: Mapping[RowBand, Raster] = field(default_factory=dict)
+    parts: Mapping[MapPart, Raster] = field(default_factory=dict)
     snapshot: Snapshot | None = None
     new_map: bool = False
 
@@ -154,7 +152,7 @@ class Checkpointer:
         self._writer = writer
         self._condition: Condition | None = None
         self._map: tuple[int, bool] | None = None
-        self._rows: Iterator[tuple[RowBand, Raster]] | None = None
+        self._parts: Iterator[dict[MapPart, Raster]] | None = None
         self._map_complete = False
         self._saved_s = -math.inf
         self._saved_at = NedPoint(math.inf, math.inf)
@@ -201,17 +199,18 @@ class Checkpointer:
         the_map = (executor.maps_begun, moment.position_doubted)
         new_map, self._map = self._map not in (None, the_map), the_map
         if new_map:
-            self._rows = None
-        elif self._rows is None and self._is_due(moment, position):
-            self._rows = _rows(executor.evidence)
-        band = None if self._rows is None else next(self._rows, None)
+            self._parts = None
+        elif self._parts is None and self._is_due(moment, position):
+            self._parts = _map_parts(executor.evidence)
+        parts = None if self._parts is None else next(self._parts, None)
         if moment.done and not moment.position_doubted:  # no further tick is delayed by copying the whole map
-            self._writer.put(StateUpdate(dict(_rows(executor.evidence))))
-        elif band is not None:
-            self._writer.put(StateUpdate(dict([band])))
-        copied = self._rows is not None and band is None
+            for rest in _map_parts(executor.evidence):
+                self._writer.put(StateUpdate(rest))
+        elif parts is not None:
+            self._writer.put(StateUpdate(parts))
+        copied = self._parts is not None and parts is None
         if copied:
-            self._rows, self._map_complete = None, True
+            self._parts, self._map_complete = None, True
             self._saved_s, self._saved_at = moment.now_s, NedPoint(position.north_m, position.east_m)
         if new_map or copied or moment.done or (changed and self._map_complete):
             self._writer.put(StateUpdate(snapshot=self._snapshot(moment, position, condition), new_map=new_map))
@@ -260,18 +259,31 @@ class Checkpointer:
         )
 
 
-def _rows(evidence: EvidenceMap) -> Iterator[tuple[RowBand, Raster]]:
-    """The map in bands of rows, each copied when it is asked for: the last may be seconds newer than the first.
+def _map_parts(evidence: EvidenceMap) -> Iterator[dict[MapPart, Raster]]:
+    """All that was seen, and all penalties, a megabyte at a time.
 
-    Rows of which nothing was seen are the same zeros: large maps are mostly that.
+    Parts are copied when they are asked for: the last may be seconds newer than the first.
     """
-    for name, raster in (("log_odds", evidence.log_odds), ("penalty", evidence.penalty)):
-        height, width = raster.shape
-        step = max(1, BAND_CELLS // width)
-        unseen = np.zeros((step, width), raster.dtype)
-        for row in range(0, height, step):
-            rows = raster[row : row + step]
-            yield RowBand(name, row, len(rows)), rows.copy() if rows.any() else unseen[: len(rows)]
+    parts: dict[MapPart, Raster] = {}
+    size = 0
+    for part, cells in _parts(evidence):
+        if parts and size + cells.size > TICK_CELLS:
+            yield parts
+            parts, size = {}, 0
+        parts[part], size = cells.copy(), size + cells.size
+    if parts:
+        yield parts
+
+
+def _parts(evidence: EvidenceMap) -> Iterator[tuple[MapPart, Raster]]:
+    for rows, columns in evidence.seen.windows():
+        place = rows.start, rows.stop - rows.start, columns.start, columns.stop - columns.start
+        yield MapPart("log_odds", *place), evidence.log_odds[rows, columns]
+    height, width = evidence.penalty.shape
+    step = max(1, TICK_CELLS // width)
+    for row in range(0, height, step):
+        penalties = evidence.penalty[row : row + step]
+        yield MapPart("penalty", row, len(penalties), 0, width), penalties
 
 
 def saved_state(snapshot: Snapshot) -> SavedState:

@@ -1,7 +1,7 @@
 """The state file of a run: its values, and their encoding to bytes and back.
 
-The file: a line with its name and version, the length of the head, the head (JSON), the map in bands of rows, a SHA-256
-of everything before. Head and bands are compressed one by one. A file that was cut, or in which one byte differs, is
+The file: a line with its name and version, the length of the head, the head (JSON), the map in parts, a SHA-256
+of everything before. Head and parts are compressed one by one. A file that was cut, or in which one byte differs, is
 refused.
 
 Nouns: saved state.
@@ -14,7 +14,7 @@ import json
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Annotated
 
 import numpy as np
@@ -30,7 +30,7 @@ from companion.safety.mode_latch import Control
 from companion.storage.validation import first_fault
 from companion.vehicle.rc_input import PULSES_US
 
-VERSION = 3
+VERSION = 4
 MAGIC = b"rover-companion state "
 LENGTH = struct.Struct(">I")
 SUM_BYTES = hashlib.sha256().digest_size
@@ -67,6 +67,8 @@ Pulse = Annotated[int, Field(ge=PULSES_US.start, lt=PULSES_US.stop)]
 NEEDS_TARGET = (MissionPhase.TRAVEL, MissionPhase.STAY, MissionPhase.WAIT)
 MAX_TARGETS = 1_000_000
 MAX_PAST_FIELDS = 4_000_000
+MAX_PART_CELLS = 4_000_000
+"""A row of fields of the widest map, or some rows of evidence."""
 
 
 class SavedValues(BaseModel):
@@ -256,34 +258,36 @@ class SavedState(SavedValues):
 
 
 @dataclass(frozen=True, slots=True)
-class RowBand:
-    """Which rows of which raster (``log_odds`` or ``penalty``)."""
+class MapPart:
+    """Which rows and columns of which raster (``log_odds`` or ``penalty``)."""
 
     raster: str
     first_row: int
     rows: int
+    first_column: int
+    columns: int
 
 
-CompressedBands = Mapping[RowBand, bytes]
-"""The map. Bands must not overlap."""
+CompressedParts = Mapping[MapPart, bytes]
+"""The map. Parts must not overlap."""
 
 
-def compressed_rows(rows: Raster) -> bytes:
-    """Rows of a raster as compressed little-endian floats."""
-    return zlib.compress(np.ascontiguousarray(rows, "<f4").tobytes(), COMPRESSION_LEVEL)
+def compressed_part(part: Raster) -> bytes:
+    """A part of a raster as compressed little-endian floats."""
+    return zlib.compress(np.ascontiguousarray(part, "<f4").tobytes(), COMPRESSION_LEVEL)
 
 
-def encode_state(state: SavedState, bands: CompressedBands) -> bytes:
+def encode_state(state: SavedState, parts: CompressedParts) -> bytes:
     """The bytes of the state file."""
-    table = [(band.raster, band.first_row, band.rows, len(data)) for band, data in bands.items()]
-    head_json = json.dumps({"state": state.model_dump(mode="json"), "bands": table})
+    table = [(*astuple(part), len(data)) for part, data in parts.items()]
+    head_json = json.dumps({"state": state.model_dump(mode="json"), "parts": table})
     head = zlib.compress(head_json.encode(), COMPRESSION_LEVEL)
-    body = b"".join((MAGIC, b"%d\n" % VERSION, LENGTH.pack(len(head)), head, *bands.values()))
+    body = b"".join((MAGIC, b"%d\n" % VERSION, LENGTH.pack(len(head)), head, *parts.values()))
     return body + hashlib.sha256(body).digest()
 
 
 def decode_state(data: bytes) -> tuple[SavedState, dict[str, Raster]]:
-    """State and rasters (``log_odds``, ``penalty``; zero where there is no band).
+    """State and rasters (``log_odds``, ``penalty``; zero where there is no part).
 
     Raises DamagedStateError, or StateError for another version of the format.
     """
@@ -306,29 +310,36 @@ def _decode_body(rest: bytes) -> tuple[SavedState, dict[str, Raster]]:
     length = LENGTH.unpack_from(rest)[0]
     start = LENGTH.size + length
     head = json.loads(_decompressed(rest[LENGTH.size : start], MAX_HEAD_BYTES))
-    if not isinstance(head, dict) or set(head) != {"state", "bands"} or not isinstance(head["bands"], list):
+    if not isinstance(head, dict) or set(head) != {"state", "parts"} or not isinstance(head["parts"], list):
         raise ValueError("unexpected content of the head")
     state = SavedState.model_validate(head["state"])
     ground = state.ground
     fine = (ground.height * ground.subdivisions, ground.width * ground.subdivisions)
     rasters = {"log_odds": lazy_zeros(fine, np.float32), "penalty": np.zeros((ground.height, ground.width), np.float32)}
-    for raster, first_row, rows, size in head["bands"]:
-        _fill(rasters[raster], first_row, rows, rest[start : start + size])
+    for raster, *place, size in head["parts"]:
+        _fill(rasters[raster], MapPart(raster, *place), rest[start : start + size])
         start += size
     if start != len(rest):
         raise ValueError("bytes left over")
     return state, rasters
 
 
-def _fill(raster: Raster, first_row: int, rows: int, data: bytes) -> None:
+def _fill(raster: Raster, part: MapPart, data: bytes) -> None:
     height, width = raster.shape
-    if not (type(first_row) is type(rows) is int and 0 <= first_row < height and 0 < rows <= height - first_row):
-        raise ValueError("a band lies outside the map")
-    values = np.frombuffer(_decompressed(data, rows * width * 4), "<f4")
+    if not (_within(part.first_row, part.rows, height) and _within(part.first_column, part.columns, width)):
+        raise ValueError("a part lies outside the map")
+    if part.rows * part.columns > MAX_PART_CELLS:
+        raise ValueError("a part of the map is too large")
+    values = np.frombuffer(_decompressed(data, part.rows * part.columns * 4), "<f4")
     if not np.isfinite(values).all():
         raise ValueError("the map contains NaN or infinity")
-    if values.any():  # rows of zeros take no memory
-        raster[first_row : first_row + rows] = values.reshape(rows, width)
+    if values.any():  # zeros take no memory
+        y, x = part.first_row, part.first_column
+        raster[y : y + part.rows, x : x + part.columns] = values.reshape(part.rows, part.columns)
+
+
+def _within(first: int, count: int, size: int) -> bool:
+    return type(first) is type(count) is int and 0 <= first < size and 0 < count <= size - first
 
 
 def _decompressed(data: bytes, max_bytes: int) -> bytes:

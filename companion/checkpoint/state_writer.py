@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from companion.checkpoint.checkpointer import Snapshot, StateUpdate, saved_state
-from companion.checkpoint.state_format import RowBand, compressed_rows, encode_state
+from companion.checkpoint.state_format import MapPart, compressed_part, encode_state
 from companion.executive.command_progress import CommandProgress
 from companion.executive.mission_progress import MissionProgress
 from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
@@ -18,9 +18,9 @@ from companion.storage.files import Disk, replace_file
 
 
 class StateFile:
-    """The file, and the rows of the map given so far. Every write is tried: a full disk may have room again.
+    """The file, and the parts of the map given so far. Every write is tried: a full disk may have room again.
 
-    ``before``: what an older state is renamed to when the first rows come, as the rover then drives a mission from its
+    ``before``: what an older state is renamed to when the first parts come, as the rover then drives a mission from its
     beginning; None where that state is resumed.
     """
 
@@ -29,7 +29,8 @@ class StateFile:
         self.problem = ""
         self._before = before
         self._disk = disk
-        self._bands: dict[RowBand, bytes] = {}
+        self._parts: dict[tuple[str, int], tuple[MapPart, bytes]] = {}
+        """By raster and first row: a newer part of the same rows holds at least the same columns."""
         self._written = b""
         self._commands: CommandProgress | None = None
 
@@ -43,16 +44,16 @@ class StateFile:
         return self._written != b""
 
     def apply(self, update: StateUpdate) -> None:
-        """Keep the rows. If there is a snapshot, write the file unless its content is unchanged."""
+        """Keep the parts. If there is a snapshot, write the file unless its content is unchanged."""
         self._set_aside()
         if update.new_map:
-            self._bands.clear()
-        for band, rows in update.rows.items():
-            self._bands[band] = compressed_rows(rows)
+            self._parts.clear()
+        for part, cells in update.parts.items():
+            self._parts[part.raster, part.first_row] = part, compressed_part(cells)
         if update.snapshot is None:
             return
         try:
-            data = encode_state(saved_state(update.snapshot), self._bands)
+            data = encode_state(saved_state(update.snapshot), dict(self._parts.values()))
             if data != self._written or self.problem:
                 replace_file(self._disk, self.path, data)
             self._written, self.problem = data, ""
@@ -105,7 +106,7 @@ class ThreadStateWriter:
 
     def _apply(self, update: StateUpdate) -> None:
         """When snapshots wait behind a slow disk, only the newest is written."""
-        self._file.apply(StateUpdate(update.rows, None, update.new_map))
+        self._file.apply(StateUpdate(update.parts, None, update.new_map))
         self._newest = update.snapshot or self._newest
         if self._newest is not None and not self._worker.behind:
             self._file.apply(StateUpdate(snapshot=self._newest))

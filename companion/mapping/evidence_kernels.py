@@ -158,25 +158,6 @@ def cast_scan(log_odds, stamps, stamp, scan, model, protected, stands):
 
 
 @njit(cache=True, nogil=True)
-def written_box(raster):
-    """The box (first x, first y, last x, last y) of all that is not zero; the last before the first for none."""
-    height, width = raster.shape
-    box = np.array((width, height, -1, -1))
-    for y in range(height):
-        first = 0
-        while first < width and raster[y, first] == 0:
-            first += 1
-        if first == width:
-            continue
-        last = width - 1
-        while raster[y, last] == 0:
-            last -= 1
-        _enclose(box, first, y)
-        _enclose(box, last, y)
-    return box
-
-
-@njit(cache=True, nogil=True)
 def weigh(log_odds, base, penalty, weights, window, occupied_at, radius_cells):
     """Weights of the fields x0 <= x < x1, y0 <= y < y1 of a window (x0, y0, x1, y1); obstacles among them."""
     height, width = base.shape

@@ -12,7 +12,7 @@ Nouns: evidence map, evidence.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -31,19 +31,18 @@ from companion.mapping.evidence_kernels import (
     soften,
     weigh,
     weigh_roomy,
-    written_box,
 )
 from companion.mapping.lazy_zeros import lazy_zeros
+from companion.mapping.seen_rows import SeenRows, Window
 from companion.mapping.sensor_agreement import SensorAgreement
 from companion.settings import MappingSettings
 
 MAX_EVIDENCE_CELLS = 101_000_000
 """Room for a target 350 m away, on cells of 0.05 m. Cells that no scan has changed take no memory."""
+STRIP_FIELDS = 16
+"""Rows of fields that are weighed together."""
 BLIND_M = 0.3
 """Beyond the least range of a wired lidar: what was seen nearer than that may now be too near to give an echo."""
-Window = tuple[slice, slice]
-"""Rows and columns of a raster."""
-NOTHING: Window = (slice(0, 0), slice(0, 0))
 MAX_SOFT_WEIGHT = 0.9
 """Soft cost never makes a field look like an obstacle."""
 
@@ -54,7 +53,8 @@ class EvidenceMap:
 
     ``log_odds``: shape (height * subdivisions, width * subdivisions), indexed [y, x]: 0 unknown, below 0 seen free,
     from ``settings.occupied_at`` on an obstacle. ``stamps``: of the scan that changed a cell last, 0 where none did: an
-    unknown cell with a stamp was an obstacle that is forgotten. ``base`` holds the mission's own weights (obstacles in
+    unknown cell with a stamp was an obstacle that is forgotten. ``seen``: where either is
+    not 0. ``base`` holds the mission's own weights (obstacles in
     it are never forgotten: they are fences or prior knowledge), ``penalty`` what experience adds. The arrays belong to
     the map and are changed in place by ``integrate``; ``grid`` is always up to date.
     """
@@ -67,6 +67,7 @@ class EvidenceMap:
     subdivisions: int
     rover_radius_m: float
     settings: MappingSettings
+    seen: SeenRows
     agreement: SensorAgreement = field(default_factory=SensorAgreement)
 
     @property
@@ -95,8 +96,9 @@ def new_map(base: Grid, rover_radius_m: float, settings: MappingSettings) -> Evi
         subdivisions=subdivisions,
         rover_radius_m=rover_radius_m,
         settings=settings,
+        seen=SeenRows(*shape),
     )
-    _refresh_all(evidence, NOTHING)
+    _refresh_all(evidence)
     return evidence
 
 
@@ -115,6 +117,7 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
         range_m = _without_too_near(
             evidence, begin, pose.heading_rad + bearing_rad, range_m, scan.min_range_m + BLIND_M
         )
+    _note_seen(evidence, begin, scan, range_m)
     kept_m = settings.narrow_kept_m if scan.is_narrow else 0.0
     turned = cast_scan(
         evidence.log_odds,
@@ -158,7 +161,8 @@ def penalise(evidence: EvidenceMap, cell: Cell, amount: float) -> None:
 
 def forget(evidence: EvidenceMap) -> None:
     """Drop all that was seen (the local frame has moved under it); fences and prior knowledge stay."""
-    evidence.log_odds[_written(evidence.log_odds)] = 0.0
+    for window in evidence.seen.windows():
+        evidence.log_odds[window] = 0.0
     evidence.penalty.fill(0.0)
     evidence.agreement.clear()
     _refresh_all(evidence)
@@ -172,11 +176,14 @@ def move(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[float, f
     side_m = evidence.evidence_m
     by = Cell(round(east_m / side_m), round(north_m / side_m))
     by_fields = Cell(round(by.x / evidence.subdivisions), round(by.y / evidence.subdivisions))
-    for raster, shift in ((evidence.log_odds, by), (evidence.stamps, by), (evidence.penalty, by_fields)):
-        window = _written(raster)
-        seen = raster[window].copy()
-        raster[window] = 0
-        _put(seen, raster, Cell(window[1].start + shift.x, window[0].start + shift.y))
+    for raster in (evidence.log_odds, evidence.stamps):
+        parts = [(window, raster[window].copy()) for window in evidence.seen.windows()]
+        for window, _ in parts:
+            raster[window] = 0
+        for window, part in parts:
+            _put(part, raster, window, by)
+    evidence.seen.take(evidence.seen.moved(by))
+    evidence.penalty[:] = shifted(evidence.penalty, evidence.penalty.shape, by_fields)
     evidence.agreement.clear()
     _refresh_all(evidence)
     return by.y * side_m, by.x * side_m
@@ -184,33 +191,21 @@ def move(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[float, f
 
 def shifted(raster: NDArray[Any], shape: tuple[int, ...], by: Cell) -> NDArray[Any]:
     """A raster on another one of this shape, moved by ``by`` to the east and north; zero where it says nothing."""
-    result, window = lazy_zeros(shape, raster.dtype), _written(raster)
-    _put(raster[window], result, Cell(window[1].start + by.x, window[0].start + by.y))
+    result = lazy_zeros(shape, raster.dtype)
+    for window in SeenRows.of(raster).windows():
+        _put(raster[window], result, window, by)
     return result
 
 
-def _put(part: NDArray[Any], raster: NDArray[Any], at: Cell) -> None:
-    """Write a part of a raster where its south-west cell is ``at``; what lies outside is lost."""
+def _put(part: NDArray[Any], raster: NDArray[Any], window: Window, by: Cell) -> None:
+    """Write what was in a window, and is not 0, elsewhere; what lies outside is lost."""
     rows, columns = part.shape
-    y0, x0 = max(0, at.y), max(0, at.x)
-    y1, x1 = min(raster.shape[0], at.y + rows), min(raster.shape[1], at.x + columns)
+    y, x = window[0].start + by.y, window[1].start + by.x
+    y0, x0 = max(0, y), max(0, x)
+    y1, x1 = min(raster.shape[0], y + rows), min(raster.shape[1], x + columns)
     if y0 < y1 and x0 < x1:
-        raster[y0:y1, x0:x1] = part[y0 - at.y : y1 - at.y, x0 - at.x : x1 - at.x]
-
-
-def _written(raster: NDArray[Any], step: int = 1) -> Window:
-    """The rows and columns that hold all that is not zero, widened to whole multiples of ``step``.
-
-    What is not looked at takes no memory, and large maps are mostly unseen.
-    """
-    left, low, right, high = (int(cell) for cell in written_box(raster))
-    if right < left:
-        return NOTHING
-    return _steps(low, high, step), _steps(left, right, step)
-
-
-def _steps(first: int, last: int, step: int) -> slice:
-    return slice(first // step * step, (last // step + 1) * step)
+        part = part[y0 - y : y1 - y, x0 - x : x1 - x]
+        np.copyto(raster[y0:y1, x0:x1], part, where=part != 0)
 
 
 def rebase(evidence: EvidenceMap, base: Grid) -> None:
@@ -232,12 +227,14 @@ def restore(
     obstacles.
     """
     settings = evidence.settings
-    evidence.log_odds[_written(evidence.log_odds)] = 0.0
-    window = _written(log_odds)
-    seen = np.clip(log_odds[window], -settings.free_limit, settings.limit)
-    if obstacles_alone:
-        seen = np.where(seen >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
-    evidence.log_odds[window] = seen
+    for window in evidence.seen.windows():
+        evidence.log_odds[window] = 0.0
+    for window in SeenRows.of(log_odds).windows():
+        seen = np.clip(log_odds[window], -settings.free_limit, settings.limit)
+        if obstacles_alone:
+            seen = np.where(seen >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
+        evidence.log_odds[window] = seen
+        evidence.seen.add(window[1].start, window[0].start, window[1].stop, window[0].stop)
     np.maximum(penalty, 0.0, out=evidence.penalty)
     _refresh_all(evidence)
 
@@ -248,16 +245,17 @@ def forget_weak_evidence(evidence: EvidenceMap, point: NedPoint, reach_m: float)
     That is weak evidence of obstacles anywhere (below ``settings.sure_at``), any evidence of obstacles within
     ``reach_m`` of the place, and all penalties. Returns whether there was any.
     """
-    window = _written(evidence.log_odds)
-    seen = evidence.log_odds[window]
-    occupied = seen >= evidence.settings.occupied_at
-    doubtful = occupied & (seen < evidence.settings.sure_at)
-    x, y = evidence.frame.xy(point)
-    reach = evidence.frame.cells(reach_m)
-    near = _round(y, reach, window[0].start), _round(x, reach, window[1].start)
-    doubtful[near] |= occupied[near]
-    found = bool(doubtful.any() or (evidence.penalty > 0.0).any())
-    _forget_cells(evidence, window, doubtful)
+    settings, (x, y) = evidence.settings, evidence.frame.xy(point)
+    reach, found = evidence.frame.cells(reach_m), bool((evidence.penalty > 0.0).any())
+    for window in evidence.seen.windows():
+        seen = evidence.log_odds[window]
+        occupied = seen >= settings.occupied_at
+        doubtful = occupied & (seen < settings.sure_at)
+        near = _round(y, reach, window[0].start), _round(x, reach, window[1].start)
+        doubtful[near] |= occupied[near]
+        found |= bool(doubtful.any())
+        _forget_cells(evidence, window, doubtful)
+    _forget_penalties(evidence)
     return found
 
 
@@ -271,19 +269,20 @@ def look_again(evidence: EvidenceMap, since_stamp: int) -> None:
 
     The ground becomes unknown, not free: whoever goes there looks first. What the mission itself closed stays.
     """
-    window = _written(evidence.log_odds)
-    occupied = evidence.log_odds[window] >= evidence.settings.occupied_at
-    _forget_cells(evidence, window, occupied & (evidence.stamps[window] < since_stamp))
+    for window in evidence.seen.windows():
+        occupied = evidence.log_odds[window] >= evidence.settings.occupied_at
+        _forget_cells(evidence, window, occupied & (evidence.stamps[window] < since_stamp))
+    _forget_penalties(evidence)
 
 
 def _forget_cells(evidence: EvidenceMap, window: Window, cells: NDArray[np.bool_]) -> None:
-    """These cells of a window are unknown again, and remembered as once seen; all penalties are dropped.
-
-    As once seen count also those that an earlier run saw.
-    """
+    """These of a window are unknown again, and remembered as once seen, also those that an earlier run saw."""
     evidence.log_odds[window][cells] = 0.0
     stamps = evidence.stamps[window]
     stamps[cells] = np.maximum(stamps[cells], 1)
+
+
+def _forget_penalties(evidence: EvidenceMap) -> None:
     evidence.penalty.fill(0.0)
     _refresh_all(evidence)
 
@@ -302,15 +301,23 @@ def _fields_where(
     evidence: EvidenceMap, holds: Callable[[NDArray[np.float32]], NDArray[np.bool_]]
 ) -> NDArray[np.bool_]:
     # Rows of cells first, then every s-th column: ten times as fast as both at once.
-    s = evidence.subdivisions
-    rows, columns = _written(evidence.log_odds, s)
-    fields = np.zeros((evidence.base.height, evidence.base.width), np.bool_)
-    cells = holds(evidence.log_odds[rows, columns])
-    if cells.size:
+    s, fields = evidence.subdivisions, np.zeros((evidence.base.height, evidence.base.width), np.bool_)
+    for rows, columns in evidence.seen.windows(s):
+        cells = holds(evidence.log_odds[rows, columns])
         of_rows = np.logical_or.reduce(cells.reshape(cells.shape[0] // s, s, -1), axis=1)
-        within = fields[rows.start // s : rows.stop // s, columns.start // s : columns.stop // s]
-        within[:] = np.logical_or.reduce([of_rows[:, column::s] for column in range(s)])
+        of_fields = np.logical_or.reduce([of_rows[:, column::s] for column in range(s)])
+        fields[rows.start // s : rows.stop // s, columns.start // s : columns.stop // s] = of_fields
     return fields
+
+
+def _note_seen(evidence: EvidenceMap, begin: NedPoint, scan: RangeScan, range_m: NDArray[np.float64]) -> None:
+    """What a scan may change: round where its rays begin, and under the rover, which is not far from there."""
+    ends_m = np.where(np.isinf(range_m), scan.sight_m, range_m)
+    far_m = float(np.nanmax(ends_m, initial=0.0)) + evidence.settings.hit_depth_m
+    under_m = math.hypot(*scan.origin_m) + evidence.rover_radius_m
+    reach = math.ceil(evidence.frame.cells(max(far_m, under_m))) + 2
+    x, y = (math.floor(at) for at in evidence.frame.xy(begin))
+    evidence.seen.add(x - reach, y - reach, x + reach, y + reach)
 
 
 def _hit_cells(evidence: EvidenceMap, pose: Pose, scan: RangeScan) -> NDArray[np.int64]:
@@ -377,24 +384,35 @@ def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
     _soften(evidence, window)
 
 
-def _refresh_all(evidence: EvidenceMap, seen: Window | None = None) -> None:
-    """Recompute all weights. Evidence counts only near what was ``seen``, and at the edges of the map."""
-    base, s = evidence.base, evidence.subdivisions
-    np.minimum(base.weights + evidence.penalty, 1.0, out=evidence.grid.weights)
-    reach = math.ceil(evidence.rover_radius_m / base.resolution_m) + 1
-    width, height, rim = base.width, base.height, min(reach, base.width, base.height)
-    for window in (
-        (0, 0, width, rim),
-        (0, height - rim, width, height),
-        (0, 0, rim, height),
-        (width - rim, 0, width, height),
-    ):
+def _refresh_all(evidence: EvidenceMap) -> None:
+    """Recompute all weights. Evidence counts only near what was seen, and at the edges of the map."""
+    weights = evidence.grid.weights
+    np.add(evidence.base.weights, evidence.penalty, out=weights)
+    is_closed = bool(weights.max() >= 1.0)
+    np.minimum(weights, 1.0, out=weights)
+    windows = tuple(_weighed_windows(evidence))
+    for window in windows:
         _weigh(evidence, window)
-    rows, columns = _written(evidence.log_odds, s) if seen is None else seen
-    if rows.start < rows.stop:
-        x0, y0 = max(columns.start // s - reach, 0), max(rows.start // s - reach, 0)
-        _weigh(evidence, (x0, y0, min(columns.stop // s + reach, width), min(rows.stop // s + reach, height)))
-    _soften(evidence, (0, 0, width, height))
+    for window in ((0, 0, evidence.base.width, evidence.base.height),) if is_closed else windows:
+        _soften(evidence, window)
+
+
+def _weighed_windows(evidence: EvidenceMap) -> Iterator[tuple[int, int, int, int]]:
+    """Windows of fields (x0, y0, x1, y1), none twice: the map's edge, and all that what was seen bears on."""
+    width, height, s = evidence.base.width, evidence.base.height, evidence.subdivisions
+    reach = _soft_reach(evidence) + 2
+    for y0 in range(0, height, STRIP_FIELDS):
+        y1 = min(y0 + STRIP_FIELDS, height)
+        if y0 < reach or y1 > height - reach or width <= 2 * reach:
+            yield 0, y0, width, y1
+            continue
+        yield 0, y0, reach, y1
+        yield width - reach, y0, width, y1
+        first, end = evidence.seen.span((y0 - reach) * s, (y1 + reach) * s)
+        if first < end:
+            x0, x1 = max(first // s - reach, reach), min(-(-end // s) + reach, width - reach)
+            if x0 < x1:
+                yield x0, y0, x1, y1
 
 
 def _weigh(evidence: EvidenceMap, window: tuple[int, int, int, int]) -> None:

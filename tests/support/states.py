@@ -16,8 +16,8 @@ from companion.checkpoint.state_format import (
     LENGTH,
     MAGIC,
     VERSION,
+    MapPart,
     Raster,
-    RowBand,
     SavedGenerator,
     SavedGrid,
     SavedNavState,
@@ -25,7 +25,7 @@ from companion.checkpoint.state_format import (
     SavedProgress,
     SavedState,
     SavedTally,
-    compressed_rows,
+    compressed_part,
     encode_state,
 )
 from companion.executive.mission_progress import MissionPhase, TargetStatus
@@ -101,13 +101,13 @@ def rasters_of(state: SavedState, seed: int) -> dict[str, Raster]:
     return {"log_odds": log_odds, "penalty": rng.random((ground.height, ground.width)).astype(np.float32)}
 
 
-def bands_of(rasters: dict[str, Raster], step: int) -> dict[RowBand, bytes]:
-    bands = {}
+def parts_of(rasters: dict[str, Raster], step: int) -> dict[MapPart, bytes]:
+    parts = {}
     for name, raster in rasters.items():
         for row in range(0, len(raster), step):
             rows = raster[row : row + step]
-            bands[RowBand(name, row, len(rows))] = compressed_rows(rows)
-    return bands
+            parts[MapPart(name, row, len(rows), 0, raster.shape[1])] = compressed_part(rows)
+    return parts
 
 
 def sealed(body: bytes) -> bytes:
@@ -115,10 +115,10 @@ def sealed(body: bytes) -> bytes:
     return body + hashlib.sha256(body).digest()
 
 
-def forged(head: Any, bands: bytes = b"") -> bytes:
+def forged(head: Any, parts: bytes = b"") -> bytes:
     """A file with any head at all, and a right checksum."""
     packed = zlib.compress(json.dumps(head).encode())
-    return sealed(MAGIC + b"%d\n" % VERSION + LENGTH.pack(len(packed)) + packed + bands)
+    return sealed(MAGIC + b"%d\n" % VERSION + LENGTH.pack(len(packed)) + packed + parts)
 
 
 def a_state(**changes: Any) -> SavedState:

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from companion.checkpoint.checkpointer import (
-    BAND_CELLS,
     SAVE_DISTANCE_M,
     SAVE_INTERVAL_S,
+    TICK_CELLS,
     Checkpointer,
     RunMoment,
     StateUpdate,
-    _rows,
+    _map_parts,
     saved_state,
 )
 from companion.checkpoint.resume import resumed_estimate, resumed_nav_state
@@ -142,7 +142,7 @@ def bench(mission: Mission) -> Bench:
 
 
 def test_the_map_is_saved_before_the_first_snapshot(bench: Bench) -> None:
-    assert [(bool(update.rows), update.snapshot) for update in bench.update()] == [(True, None)]
+    assert [(bool(update.parts), update.snapshot) for update in bench.update()] == [(True, None)]
     bench.until_saved()
 
 
@@ -183,7 +183,7 @@ def test_a_change_is_saved_immediately(bench: Bench, change: Callable[[Bench], d
     bench.until_saved()
     assert bench.update() == []
     (update,) = bench.update(**change(bench))
-    assert update.snapshot is not None and not update.rows and not update.new_map
+    assert update.snapshot is not None and not update.parts and not update.new_map
 
 
 @pytest.mark.parametrize("doubted", [False, True])
@@ -191,13 +191,14 @@ def test_a_map_that_was_forgotten_is_void_in_the_file_at_once(bench: Bench, doub
     bench.until_saved()
     bench.executor.maps_begun += not doubted
     (update,) = bench.update(position_doubted=doubted)
-    assert update.new_map and update.snapshot is not None and not update.rows
+    assert update.new_map and update.snapshot is not None and not update.parts
 
 
 def test_at_the_end_the_whole_map_is_saved(bench: Bench) -> None:
     bench.update()
+    bench.executor.evidence.seen.add(5, 5, 9, 9)
     first, last = bench.update(done=True)
-    assert {band.raster for band in first.rows} == {"log_odds", "penalty"}
+    assert {part.raster for part in first.parts} == {"log_odds", "penalty"}
     assert last.snapshot is not None and not last.snapshot.ended, "the mission is not over"
 
 
@@ -236,13 +237,24 @@ def test_a_problem_is_noted_in_the_record(bench: Bench, monkeypatch: pytest.Monk
     assert marks == [Mark.UNSAVED] and text and "space" not in text
 
 
-def test_a_large_map_is_copied_in_parts_of_a_megabyte() -> None:
+def test_a_large_map_is_copied_a_megabyte_at_a_time() -> None:
     evidence = new_map(empty_grid(1000, 900), 0.35, MappingSettings(evidence_m=0.5))
     evidence.log_odds[:] = np.arange(evidence.log_odds.size, dtype=np.float32).reshape(evidence.log_odds.shape)
-    bands = list(_rows(evidence))
-    assert all(rows.size <= BAND_CELLS for _, rows in bands) and len(bands) > 10
-    fine = [(place, rows) for place, rows in bands if place.raster == "log_odds"]
-    assert np.array_equal(np.concatenate([rows for _, rows in fine]), evidence.log_odds)
-    unseen = [rows for place, rows in bands if place.raster == "penalty"]
-    assert len(unseen) > 1 and np.shares_memory(unseen[0], unseen[1]) and not unseen[0].any(), "no memory for each"
-    assert [place.first_row for place, _ in fine] == list(np.cumsum([0, *[place.rows for place, _ in fine]])[:-1])
+    evidence.seen.add(0, 0, 2000, 1800)
+    copies = list(_map_parts(evidence))
+    assert all(sum(cells.size for cells in copy.values()) <= TICK_CELLS for copy in copies) and len(copies) > 10
+    fine, coarse = np.zeros_like(evidence.log_odds), np.ones_like(evidence.penalty)
+    for part, cells in (one for copy in copies for one in copy.items()):
+        rows, x = slice(part.first_row, part.first_row + part.rows), part.first_column
+        (fine if part.raster == "log_odds" else coarse)[rows, x : x + part.columns] = cells
+    assert np.array_equal(fine, evidence.log_odds) and np.array_equal(coarse, evidence.penalty)
+
+
+def test_of_a_large_map_only_what_was_seen_is_copied_and_always_in_the_same_rows() -> None:
+    evidence, places = new_map(empty_grid(1000, 900), 0.35, MappingSettings(evidence_m=0.5)), []
+    for x in (700, 650, 1200):
+        evidence.seen.add(x, 500, x + 30, 540)
+        parts = [part for copy in _map_parts(evidence) for part in copy if part.raster == "log_odds"]
+        places.append([(part.first_row, part.rows) for part in parts])
+        assert sum(part.rows * part.columns for part in parts) <= 64 * 580
+    assert places[0] == places[1] == places[2]

@@ -40,7 +40,7 @@ def test_another_missions_state_is_refused_and_left_where_it_is(tmp_path: Path) 
     assert place.load(mission) is not None
 
 
-@pytest.mark.parametrize("data", [b"", b"rubbish", sealed(MAGIC + b"3\n")], ids=["empty", "rubbish", "forged"])
+@pytest.mark.parametrize("data", [b"", b"rubbish", sealed(MAGIC + b"4\n")], ids=["empty", "rubbish", "forged"])
 def test_a_damaged_state_is_refused_kept_aside_and_named(tmp_path: Path, data: bytes) -> None:
     mission = yard(tmp_path)
     place = leave_state(tmp_path, mission)
@@ -63,7 +63,7 @@ def test_a_state_of_another_version_stays(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     place = leave_state(tmp_path, mission)
     place.file.write_bytes(sealed(MAGIC + b"9\nnew things"))
-    assert "format '9', this program reads 3" in refused(place, mission)
+    assert "format '9', this program reads 4" in refused(place, mission)
     assert place.file.exists()
 
 

@@ -19,21 +19,21 @@ from companion.checkpoint.state_format import (
     encode_state,
 )
 from tests.support.quick import examples
-from tests.support.states import a_state, bands_of, forged, rasters_of, sealed, states
+from tests.support.states import a_state, forged, parts_of, rasters_of, sealed, states
 
 QUICK = settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 def written() -> bytes:
     state = a_state()
-    return encode_state(state, bands_of(rasters_of(state, 1), 3))
+    return encode_state(state, parts_of(rasters_of(state, 1), 3))
 
 
 @QUICK
 @given(states(), st.integers(0, 2**32 - 1), st.integers(1, 30))
 def test_what_was_written_comes_back(state: SavedState, seed: int, step: int) -> None:
     rasters = rasters_of(state, seed)
-    found, map_found = decode_state(encode_state(state, bands_of(rasters, step)))
+    found, map_found = decode_state(encode_state(state, parts_of(rasters, step)))
     assert found == state
     assert all(np.array_equal(map_found[name], rasters[name]) for name in ("log_odds", "penalty"))
 
@@ -80,7 +80,7 @@ JSON = st.recursive(
 @QUICK
 @given(JSON)
 def test_a_head_that_is_none_is_refused_though_its_checksum_is_right(head: Any) -> None:
-    for forgery in (head, {"state": head, "bands": []}, {"state": a_state().model_dump(mode="json"), "bands": [head]}):
+    for forgery in (head, {"state": head, "parts": []}, {"state": a_state().model_dump(mode="json"), "parts": [head]}):
         with pytest.raises(DamagedStateError):
             decode_state(forged(forgery))
 
@@ -108,7 +108,7 @@ def test_a_value_that_is_none_is_refused_or_harmless_wherever_it_stands() -> Non
     for path in paths(good):
         for wrong in WRONG:
             try:
-                state, rasters = decode_state(forged({"state": replaced(good, path, wrong), "bands": []}))
+                state, rasters = decode_state(forged({"state": replaced(good, path, wrong), "parts": []}))
             except DamagedStateError as error:
                 refused += 1
                 assert len(str(error).splitlines()) == 1
@@ -119,18 +119,20 @@ def test_a_value_that_is_none_is_refused_or_harmless_wherever_it_stands() -> Non
 
 
 @pytest.mark.parametrize(
-    ("table", "bands"),
+    ("table", "parts"),
     [
-        ([["log_odds", 0, 1, 4]], b"abcd"),
-        ([["log_odds", -1, 1, 9]], zlib.compress(bytes(56))),
-        ([["log_odds", 10, 1, 14]], zlib.compress(bytes(56))),
-        ([["log_odds", 0, 2, 14]], zlib.compress(bytes(56))),
-        ([["log_odds", 0, 1, 10**9]], zlib.compress(bytes(56))),
-        ([["log_odds", 0, 1, len(zlib.compress(bytes(10**7)))]], zlib.compress(bytes(10**7))),
-        ([["log_odds", 0, 1, len(zlib.compress(b"\xff" * 56))]], zlib.compress(b"\xff" * 56)),
-        ([["walls", 0, 1, 0]], b""),
-        ([["log_odds", 0.0, 1, 0]], b""),
+        ([["log_odds", 0, 1, 0, 14, 4]], b"abcd"),
+        ([["log_odds", -1, 1, 0, 14, 9]], zlib.compress(bytes(56))),
+        ([["log_odds", 10, 1, 0, 14, 14]], zlib.compress(bytes(56))),
+        ([["log_odds", 0, 2, 0, 14, 14]], zlib.compress(bytes(56))),
+        ([["log_odds", 0, 1, 0, 14, 10**9]], zlib.compress(bytes(56))),
+        ([["log_odds", 0, 1, 0, 14, len(zlib.compress(bytes(10**7)))]], zlib.compress(bytes(10**7))),
+        ([["log_odds", 0, 1, 0, 14, len(zlib.compress(b"\xff" * 56))]], zlib.compress(b"\xff" * 56)),
+        ([["walls", 0, 1, 0, 14, 0]], b""),
+        ([["log_odds", 0.0, 1, 0, 14, 0]], b""),
         ([["log_odds", 0, 1]], b""),
+        ([["log_odds", 0, 1, -1, 14, 14]], zlib.compress(bytes(56))),
+        ([["log_odds", 0, 1, 1, 14, 14]], zlib.compress(bytes(56))),
         ([], b"left over"),
     ],
     ids=[
@@ -144,12 +146,14 @@ def test_a_value_that_is_none_is_refused_or_harmless_wherever_it_stands() -> Non
         "name",
         "no row",
         "short",
+        "west",
+        "east",
         "left over",
     ],
 )
-def test_bands_that_do_not_fit_are_refused(table: list[Any], bands: bytes) -> None:
+def test_parts_that_do_not_fit_are_refused(table: list[Any], parts: bytes) -> None:
     with pytest.raises(DamagedStateError):
-        decode_state(forged({"state": a_state().model_dump(mode="json"), "bands": table}, bands))
+        decode_state(forged({"state": a_state().model_dump(mode="json"), "parts": table}, parts))
 
 
 def test_another_version_is_named_and_not_called_damaged() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
 from companion.checkpoint.state_directory import StateDirectoryError
-from companion.checkpoint.state_format import RowBand, SavedProgress
+from companion.checkpoint.state_format import MapPart, SavedProgress
 from companion.checkpoint.state_writer import StateFile
 from companion.cli.inputs import OutputError
 from companion.cli.state import RunState, StateFiles
@@ -71,7 +71,7 @@ def test_a_state_file_keeps_the_older_state_when_the_first_rows_come(tmp_path: P
     file = StateFile(path, OsDisk(), before)
     assert path.exists() and not file.is_saved
     for _ in range(2):
-        file.apply(StateUpdate({RowBand("log_odds", 0, 1): np.zeros((1, 4), dtype=np.float32)}))
+        file.apply(StateUpdate({MapPart("log_odds", 0, 1, 0, 4): np.zeros((1, 4), dtype=np.float32)}))
     assert not path.exists() and before.read_bytes() == b"older"
 
 

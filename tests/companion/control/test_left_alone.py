@@ -42,6 +42,7 @@ CELL_M = 0.1
 def open_ground() -> EvidenceMap:
     evidence = new_map(empty_grid(SIDE, SIDE), 0.35, SETTINGS.mapping)
     evidence.log_odds.fill(-1.0)
+    evidence.seen.add(0, 0, *reversed(evidence.log_odds.shape))
     assert evidence.evidence_m == pytest.approx(CELL_M)
     return evidence
 

@@ -25,6 +25,7 @@ def ground() -> EvidenceMap:
     """20 x 20 m, all seen free."""
     evidence = new_map(empty_grid(20, 20), 0.35, SETTINGS.mapping)
     evidence.log_odds.fill(-1.0)
+    evidence.seen.add(0, 0, *reversed(evidence.log_odds.shape))
     return evidence
 
 

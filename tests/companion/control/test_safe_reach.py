@@ -107,6 +107,7 @@ def test_looking_again_forgets_only_what_was_not_just_seen() -> None:
         put(evidence, north_m, 5.0)
         y, x = int(north_m / evidence.evidence_m), int(5.0 / evidence.evidence_m)
         evidence.stamps[y : y + 2, x : x + 2] = stamp
+    evidence.seen.add(0, 0, *reversed(evidence.log_odds.shape))
     look_again(evidence, 80)
     at = [evidence.log_odds[int(n / evidence.evidence_m), int(5.0 / evidence.evidence_m)] for n in (8.0, 12.0, 16.0)]
     assert at[0] == 0.0 and at[1] == 2.0 and at[2] == -1.0

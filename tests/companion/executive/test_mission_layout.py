@@ -49,6 +49,7 @@ def test_a_map_that_is_saved_and_read_again_and_again_stays_as_it_is(tmp_path: P
             log_odds = layout.evidence.log_odds
             log_odds[200:260, 200:260] = -2.0
             log_odds[230, 210:250] = 3.0
+            layout.evidence.seen.add(200, 200, 260, 260)
         save_ros_map(seen_ground(layout)[0], tmp_path / f"m{number}", seen_ground(layout)[1])
         saved = tmp_path / f"m{number}.yaml"
         mission = replace(mission, prior_map=saved)
