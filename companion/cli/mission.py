@@ -26,7 +26,7 @@ from companion.mission.field_size import FieldSize, field_size
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place, RoverSpec
-from companion.mission.outline_hint import outline_hint
+from companion.mission.outline_hint import guard_hint, outline_hint
 from companion.mission.resolve import ResolvedMission, resolve
 from companion.mission.sensor_tables import BEAMS
 from companion.mission.simulated_world import SimulatedWorld, check_start, doubtful_targets, world_of
@@ -248,6 +248,8 @@ def _fields_by_rover(mission: Mission, settings: Settings) -> tuple[str, str]:
     if size.may_be_finer(side_m):
         of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
         smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"
+        if settings.mapping.keeps == "outline":  # with a resolution_m evidence is coarser, and opens fewer
+            smaller = "a smaller margin_m in [grid], or targets on the way" if of_ours else "targets on the way"
         most, narrower = f", and no more than {size.most} of them", f"; for narrower gaps give {smaller}"
     told, gaps = f"fields of {side_m:.3g} m ({why}{most})", _gaps(open_gap_m(rover, evidence))
     by_beams = _map_at_start(mission, settings, narrow_sight=True)
@@ -280,7 +282,8 @@ def _vehicle(mission: Mission, settings: Settings) -> list[str]:
         f"in arcs of {rover.turning_radius_m:g} m radius or wider" if rover.turning_radius_m > 0.0 else "on the spot"
     )
     lines = [f"rover: {outline_text(rover)}, cruises at {rover.cruise_speed_m_s:g} m/s, turns {turns}"]
-    if hint := outline_hint(rover, settings.guidance.controller):
+    controller = settings.guidance.controller
+    if hint := outline_hint(rover, controller) or guard_hint(rover, controller):
         lines.append(f"note: {hint}")
     if mission.planned_home is not None:
         lines.append(f"planned home: {place_text(mission.planned_home)}; the rover's own home is what counts")

@@ -58,7 +58,11 @@ class MappingSettings(Section):
     """From range data to field weights."""
 
     evidence_m: float = Field(
-        0.125, ge=0.01, description="side of an evidence cell; a field's side is a whole number of them"
+        0.125,
+        ge=0.05,
+        le=2.0,
+        description="side of an evidence cell; a field's side is a whole number of them. Smaller ones were not tried: "
+        "planned motions are bolder in gaps then",
     )
     keeps: Literal["circle", "outline"] = Field(
         "circle",
@@ -156,6 +160,7 @@ class GuidanceSettings(Section):
     velocity_lasts_s: float = Field(
         3.0,
         gt=0.0,
+        le=30.0,
         description="the autopilot stops the rover this long after the last velocity command (ArduRover: 3 s)",
     )
     overshoot_m: float = Field(
