@@ -13,6 +13,7 @@ from pathlib import Path
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.lidar.spec import LidarSpec
+from companion.mapping.map_files import MapError
 from companion.mission.mission import Mission, RoverSpec, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
@@ -206,7 +207,11 @@ def _ground(mission: Mission, spec: SitlSpec, name: str) -> tuple[World, tuple[f
     cell = spec.start or mission.grid.home
     if spec.world is None:
         return World.open(), _middle(cell, mission.grid.resolution_m) if cell else (0.0, 0.0)
-    world = load_world(spec.world, spec.resolution_m or mission.grid.resolution_m)
+    try:
+        world = load_world(spec.world, spec.resolution_m or mission.grid.resolution_m)
+    except MapError as error:
+        place = "" if mission.source is None else f"{mission.source}: sitl.world: "
+        raise MapError(f"{place}{error}") from error
     if cell is None:
         raise ScenarioError(f"{name}: sitl.start: missing; give the field of {spec.world} in which the rover starts")
     shapes = spec.world.suffix.lower() == ".toml"

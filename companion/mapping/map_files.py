@@ -77,6 +77,8 @@ def load_map(path: Path, resolution_m: float | None = None) -> Grid:
         return Grid(_read_movingai(path), size_m)
     if suffix in IMAGE_SUFFIXES:
         return Grid(_weights_of(*_read_grey(path), Shades()), size_m)
+    if path.is_dir():
+        raise MapError(f"{path}: is a folder, not a map; name a file in it")
     raise MapError(f"{path}: suffix '{path.suffix}' is no map format; known: .yaml, .map, {', '.join(IMAGE_SUFFIXES)}")
 
 

@@ -45,6 +45,8 @@ WORDS = {
 def plain(fault: ErrorDetails) -> str:
     """The reason of a fault, in one line."""
     words = WORDS.get(fault["type"])
+    if r"\x00-\x1f" in fault.get("ctx", {}).get("pattern", ""):
+        return "must have no line breaks or other control characters"
     if words is not None:
         return words.format(**_whole(fault.get("ctx", {})))
     message = " ".join(fault["msg"].split()).removeprefix("Value error, ")

@@ -8,6 +8,8 @@ from PIL import Image
 
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
+from companion.mapping.map_files import MapError
+from companion.mission.load import load_mission
 from companion.mission.mission import GridSpec, Mission, RoverSpec, SitlSpec, Target
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.plant.outline import Outline
@@ -88,3 +90,11 @@ def test_what_cannot_be_simulated_is_told_in_one_line(world_file: Path, start: C
 def test_a_world_without_a_start_is_refused(world_file: Path) -> None:
     with pytest.raises(ScenarioError, match=r"sitl\.start"):
         scenario_from_mission(Mission("plan", (), sitl=SitlSpec(world=world_file)))
+
+
+def test_a_world_that_is_none_is_told_with_the_mission_and_the_key(tmp_path: Path) -> None:
+    path = tmp_path / "yard.toml"
+    path.write_text('[[target]]\nnorth_m = 5.0\neast_m = 0.0\n[sitl]\nworld = "yard.txt"\n')
+    (tmp_path / "yard.txt").touch()
+    with pytest.raises(MapError, match=rf"^{path}: sitl.world: .*yard.txt: suffix '.txt' is no map format"):
+        scenario_from_mission(load_mission(path))

@@ -169,6 +169,7 @@ def test_a_png_bomb_is_refused_by_its_header(tmp_path: Path) -> None:
 
 def test_other_files_are_refused(tmp_path: Path) -> None:
     assert "suffix '.txt'" in refusal(tmp_path / "map.txt")
+    assert "is a folder, not a map" in refusal(tmp_path)
     assert "no such file" in refusal(tmp_path / "gone.png")
     assert "cannot be read" in refusal(tmp_path / "gone.map")
     assert "cannot be read" in refusal(tmp_path / "gone.yaml")

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from companion.mission.tables import Name
 from companion.settings import Settings
 from companion.storage.validation import describe_first, first_fault
 
@@ -20,6 +21,7 @@ class Part(BaseModel):
     whole: int = 0
     yes: bool = False
     text: Annotated[str, Field(min_length=2, max_length=3, pattern="^[a-z]*$")] = "ab"
+    name: Name = "n"
     share: Annotated[float, Field(ge=0.0, lt=0.5)] = 0.0
     length: Annotated[float, Field(gt=1e-3, le=2.0, allow_inf_nan=False)] = 1.0
     kind: Literal["A", "B"] = "A"
@@ -37,6 +39,7 @@ class Part(BaseModel):
         ({"text": "a"}, "text: must have 2 or more characters (got 'a')"),
         ({"text": "abcd"}, "text: must have 3 characters or fewer (got 'abcd')"),
         ({"text": "AB"}, "text: must match the pattern '^[a-z]*$' (got 'AB')"),
+        ({"name": "a\nb"}, "name: must have no line breaks or other control characters (got 'a\\nb')"),
         ({"share": -1.0}, "share: must be 0 or more (got -1.0)"),
         ({"share": 0.5}, "share: must be less than 0.5 (got 0.5)"),
         ({"length": 0.0}, "length: must be more than 0.001 (got 0.0)"),
