@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import typer
 from rich.console import Console
@@ -62,6 +63,7 @@ def experiment(
             names_in(setups), guard, off, late, keep, names_in(missions), given.outline_m(outline), turning_radius,
         )  # fmt: skip
         given.refuse_unused(name, options)
+        _check_keep(keep)
         report = _with_progress(name, options, console)
         _put_out(report, console, json_file, docs)
     except (ExperimentError, MapError, OutputError) as error:
@@ -80,6 +82,20 @@ def _check(name: str, json_file: Path | None, docs: Path | None) -> None:
         raise ExperimentError(fault)
     writable(json_file)
     writable(docs and docs / "results.md")
+
+
+def _check_keep(keep: Path | None) -> None:
+    """Make the folder and try to write into it. Raises OutputError."""
+    if keep is None:
+        return
+    try:
+        keep.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=keep):
+            pass
+    except OSError as error:
+        raise OutputError(
+            f"--keep {keep}: cannot be written: {error.strerror or error}; name a folder that can be made"
+        ) from error
 
 
 def _with_progress(name: str, options: Options, console: Console) -> ExperimentReport:

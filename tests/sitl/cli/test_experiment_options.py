@@ -1,0 +1,25 @@
+"""Options of ``rover-sitl experiment`` that cannot be used: one line and exit code 2, before the work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from sitl.cli.commands import app
+
+
+def refused(*arguments: str) -> str:
+    """What is said on the one line."""
+    result = CliRunner().invoke(app, ["experiment", *arguments])
+    assert result.exit_code == 2 and result.output.count("\n") == 1, result.output
+    return result.output
+
+
+@pytest.mark.parametrize(("place", "reason"), [("file", "File exists"), ("file/kept", "Not a directory")])
+def test_a_folder_that_cannot_keep_results_is_told_before_the_work(tmp_path: Path, place: str, reason: str) -> None:
+    (tmp_path / "file").touch()
+    keep = tmp_path / place
+    said = refused("gates", "--runs", "1", "--keep", str(keep))
+    assert said.startswith(f"--keep {keep}: cannot be written: {reason}; ")
