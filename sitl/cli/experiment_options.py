@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from sitl.campaign.campaign_file import MOST_RUNS
 from sitl.experiments.experiment import OFF_MODEL, ExperimentError, Options
 
 EXPERIMENTS = (
@@ -63,6 +64,7 @@ Runs = Annotated[
     int | None,
     typer.Option(
         min=1,
+        max=MOST_RUNS,
         help="Runs, with consecutive seeds, on each map, mission or world; default: "
         f"{RUNS}, for barn {RUNS_OF_BARN}. kwasniewski-table1 makes at least 3.",
     ),

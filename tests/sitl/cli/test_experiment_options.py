@@ -23,3 +23,9 @@ def test_a_folder_that_cannot_keep_results_is_told_before_the_work(tmp_path: Pat
     keep = tmp_path / place
     said = refused("gates", "--runs", "1", "--keep", str(keep))
     assert said.startswith(f"--keep {keep}: cannot be written: {reason}; ")
+
+
+@pytest.mark.parametrize(("runs", "bound"), [("0", "greater than or equal to 1"), ("1000001", "equal to 1000000")])
+def test_there_are_no_more_runs_than_in_a_campaign(runs: str, bound: str) -> None:
+    result = CliRunner().invoke(app, ["experiment", "moon", "--runs", runs])
+    assert result.exit_code == 2 and bound in " ".join(result.output.split()), result.output
