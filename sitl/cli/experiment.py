@@ -17,7 +17,6 @@ from companion.settings import Settings
 from companion.settings.versions import made_with
 from sitl.cli import experiment_options as given
 from sitl.cli.extras import statistics_fault
-from sitl.cli.named import names_in
 from sitl.experiments.experiment import OFF_MODEL, Checked, Experiment, ExperimentError, ExperimentReport, Options
 
 WITH_STATISTICS = ("barn", "gates", "killed-companion", "traffic", "wang-table4")
@@ -33,15 +32,15 @@ def experiment(
     jobs: given.Jobs = 1,
     maps: given.Maps = None,
     world: given.World = None,
-    planners: given.Planners = "",
+    planners: given.Planners = None,
     worlds: given.Worlds = None,
-    controllers: given.Controllers = "",
-    setups: given.Setups = "",
-    missions: given.Missions = "",
+    controllers: given.Controllers = None,
+    setups: given.Setups = None,
+    missions: given.Missions = None,
     guard: given.Guard = False,
     off: given.Off = OFF_MODEL,
     late: given.Late = 0.0,
-    outline: given.Outline = "",
+    outline: given.Outline = None,
     turning_radius: given.TurningRadius = 0.0,
     keep: given.Keep = None,
     json_file: given.JsonFile = None,
@@ -54,13 +53,11 @@ def experiment(
     console = Console()
     try:
         _check(name, json_file, docs)
-        for option, listed in (("--planners", planners), ("--controllers", controllers), ("--missions", missions)):
-            if listed and not names_in(listed):
-                raise ExperimentError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
         runs = runs or (given.RUNS_OF_BARN if name == "barn" else given.RUNS)
         options = Options(
-            runs, seed, jobs, maps, tuple(world or ()), names_in(planners), worlds, names_in(controllers),
-            names_in(setups), guard, off, late, keep, names_in(missions), given.outline_m(outline), turning_radius,
+            runs, seed, jobs, maps, tuple(world or ()), given.names_given("--planners", planners), worlds,
+            given.names_given("--controllers", controllers), given.names_given("--setups", setups), guard, off, late,
+            keep, given.names_given("--missions", missions), given.outline_m(outline), turning_radius,
         )  # fmt: skip
         given.refuse_unused(name, options)
         _check_keep(keep)

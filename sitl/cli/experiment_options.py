@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from sitl.campaign.campaign_file import MOST_RUNS
+from sitl.cli.named import names_in
 from sitl.experiments.experiment import OFF_MODEL, ExperimentError, Options
 
 EXPERIMENTS = (
@@ -81,7 +82,7 @@ World = Annotated[
     typer.Option(help=f"{_of('--world')}: another map, with its MovingAI scenario file beside it; may be repeated."),
 ]
 Planners = Annotated[
-    str,
+    str | None,
     typer.Option(help=f"{_of('--planners')}: names, separated by commas; default: all that apply."),
 ]
 Worlds = Annotated[
@@ -93,21 +94,21 @@ Worlds = Annotated[
     ),
 ]
 Controllers = Annotated[
-    str,
+    str | None,
     typer.Option(
         help=f"{_of('--controllers')}: what leads the rover, names separated by commas; default: all, for "
         "gates motion-ga, for dead-companion, killed-companion and missions points."
     ),
 ]
 Setups = Annotated[
-    str,
+    str | None,
     typer.Option(
         help="barn: guarded, strict (without the guard), jackal (a Jackal's limits), separated by commas; gates: "
         "one of the first two; default: guarded."
     ),
 ]
 Missions = Annotated[
-    str,
+    str | None,
     typer.Option(help=f"{_of('--missions')}: names of shipped missions, separated by commas; default: all."),
 ]
 Guard = Annotated[bool, typer.Option("--guard", help=f"{_of('--guard')}: with the guard on the autopilot.")]
@@ -120,7 +121,7 @@ Late = Annotated[
     typer.Option(min=0.0, max=2.0, help=f"{_of('--late')}: seconds that a message takes over the link, each way."),
 ]
 Outline = Annotated[
-    str,
+    str | None,
     typer.Option(
         metavar="LENGTHxWIDTH",
         help="gates: the rover's outline in metres, 2.0x0.5 for example; default: 0.9x0.7.",
@@ -145,9 +146,19 @@ JsonFile = Annotated[Path | None, typer.Option("--json", help="Write all figures
 Docs = Annotated[Path | None, typer.Option(help="Folder whose results.md and images/ are updated; created if missing.")]
 
 
-def outline_m(given: str) -> tuple[float, float] | None:
+def names_given(option: str, listed: str | None) -> tuple[str, ...]:
+    """The names of an option; none if it is not there. Raises ExperimentError for one that names nothing."""
+    if listed is None:
+        return ()
+    names = names_in(listed)
+    if not names:
+        raise ExperimentError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
+    return names
+
+
+def outline_m(given: str | None) -> tuple[float, float] | None:
     """Length and width in metres. Raises ExperimentError."""
-    if not given:
+    if given is None:
         return None
     try:
         length_m, width_m = (float(one) for one in given.split("x"))

@@ -29,3 +29,14 @@ def test_a_folder_that_cannot_keep_results_is_told_before_the_work(tmp_path: Pat
 def test_there_are_no_more_runs_than_in_a_campaign(runs: str, bound: str) -> None:
     result = CliRunner().invoke(app, ["experiment", "moon", "--runs", runs])
     assert result.exit_code == 2 and bound in " ".join(result.output.split()), result.output
+
+
+@pytest.mark.parametrize("listed", ["", " , "])
+@pytest.mark.parametrize("option", ["--planners", "--controllers", "--setups", "--missions"])
+def test_a_list_that_names_nothing_does_not_mean_all(option: str, listed: str) -> None:
+    said = refused("soak", "--runs", "1", option, listed)
+    assert said == f"{option} {listed!r}: names nothing; separate names by commas\n"
+
+
+def test_an_empty_outline_is_none() -> None:
+    assert refused("gates", "--outline", "").startswith("--outline '': give length and width")
