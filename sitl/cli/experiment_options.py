@@ -45,12 +45,15 @@ TAKERS = {
     "--late": ("barn", "controllers", "gates", "killed-companion", "missions"),
     "--outline": ("gates",),
     "--turning-radius": ("driving",),
+    "--maps": (
+        "adaptive-control-points", "kwasniewski-maps", "kwasniewski-table1", "navigation", "driving", "dead-companion",
+        "killed-companion", "missions", "traffic", "sedighi-table1",
+    ),
     "--keep": (
         "barn", "controllers", "dead-companion", "driving", "gates", "killed-companion", "missions", "traffic",
     ),
 }  # fmt: skip
 """The experiments that each option is for; those that are not here are for all of them."""
-OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
 RUNS, RUNS_OF_BARN = 100, 10
 """Unless it is said; the second as the BARN challenge has it."""
 
@@ -75,7 +78,11 @@ Jobs = Annotated[
     int, typer.Option(min=1, help="Processes (needs joblib). Results stay the same, but measured times get longer.")
 ]
 Maps = Annotated[
-    Path | None, typer.Option(help="Folder with the maps; default: missions/maps. sedighi-table1: more grids.")
+    Path | None,
+    typer.Option(
+        help=f"{_of('--maps')}: folder with the maps, and with the shipped missions beside it; default: missions/maps. "
+        "sedighi-table1: more grids."
+    ),
 ]
 World = Annotated[
     list[Path] | None,
@@ -185,13 +192,14 @@ def refuse_unused(name: str, options: Options) -> None:
         "--late": options.late_s,
         "--outline": options.outline_m,
         "--turning-radius": options.turning_radius_m,
+        "--maps": options.maps,
         "--keep": options.keep,
     }
     for option, takers in TAKERS.items():
         if given[option] and name not in takers:
             listed = " and ".join(filter(None, (", ".join(takers[:-1]), takers[-1])))
             raise ExperimentError(f"{option}: {name} does not take it; the option is for {listed}")
-    if options.maps is not None and name in OWN_ENVIRONMENTS:
-        raise ExperimentError(f"--maps: {name} draws the paper's own environments, it reads no maps")
+    if options.turning_radius_m and options.maps is not None:
+        raise ExperimentError("--turning-radius: with it the random grounds alone are driven; leave out --maps")
     if options.turning_radius_m and options.worlds:
         raise ExperimentError("--turning-radius: with it the random grounds alone are driven; leave out --world")

@@ -8,6 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from sitl.cli.commands import app
+from sitl.cli.experiment_options import EXPERIMENTS
+
+WITHOUT_MAPS = ("gates", "barn", "controllers", "soak", "wang-table4", "achour-table1")
 
 
 def refused(*arguments: str) -> str:
@@ -40,3 +43,19 @@ def test_a_list_that_names_nothing_does_not_mean_all(option: str, listed: str) -
 
 def test_an_empty_outline_is_none() -> None:
     assert refused("gates", "--outline", "").startswith("--outline '': give length and width")
+
+
+@pytest.mark.parametrize("name", WITHOUT_MAPS)
+def test_maps_that_an_experiment_does_not_read_are_refused(name: str, tmp_path: Path) -> None:
+    said = refused(name, "--runs", "1", "--maps", str(tmp_path))
+    assert said.startswith(f"--maps: {name} does not take it; the option is for ")
+
+
+@pytest.mark.parametrize("name", [one for one in EXPERIMENTS if one not in WITHOUT_MAPS])
+def test_maps_that_an_experiment_reads_are_looked_for(name: str, tmp_path: Path) -> None:
+    assert str(tmp_path / "none") in refused(name, "--runs", "1", "--maps", str(tmp_path / "none"))
+
+
+def test_with_a_turning_radius_no_maps_are_read(tmp_path: Path) -> None:
+    said = refused("driving", "--runs", "1", "--turning-radius", "2", "--maps", str(tmp_path))
+    assert said.startswith("--turning-radius: ") and said.endswith("leave out --maps\n")
