@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -21,6 +22,8 @@ from sitl.experiments.experiment import OFF_MODEL, Checked, Experiment, Experime
 
 WITH_STATISTICS = ("barn", "gates", "killed-companion", "traffic", "wang-table4")
 EXIT_FAILED = 3
+WIDTH = 200
+"""Of the output where there is no terminal: no table is wider."""
 LINES = 10
 """Of progress, where there is no terminal for a bar."""
 
@@ -50,7 +53,7 @@ def experiment(
 
     Exit code 2: bad input; 3: soak: a collision, an error, growing memory; dead-companion, killed-companion: a contact.
     """
-    console = Console()
+    console = _console()
     try:
         _check(name, json_file, docs)
         runs = runs or (given.RUNS_OF_BARN if name == "barn" else given.RUNS)
@@ -69,6 +72,14 @@ def experiment(
     if isinstance(report, Checked) and report.failure:
         typer.echo(f"experiment {name}: {report.failure}", err=True)
         raise typer.Exit(EXIT_FAILED)
+
+
+def _console() -> Console:
+    """Into a file or pipe tables are whole: rich would take 80 columns there, and cut the headings."""
+    console = Console()
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = WIDTH
+    return console
 
 
 def _check(name: str, json_file: Path | None, docs: Path | None) -> None:

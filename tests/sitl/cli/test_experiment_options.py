@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from sitl.cli.commands import app
 from sitl.cli.experiment_options import EXPERIMENTS
+from sitl.experiments import gates
 
 WITHOUT_MAPS = ("gates", "barn", "controllers", "soak", "wang-table4", "achour-table1")
 
@@ -59,3 +60,18 @@ def test_maps_that_an_experiment_reads_are_looked_for(name: str, tmp_path: Path)
 def test_with_a_turning_radius_no_maps_are_read(tmp_path: Path) -> None:
     said = refused("driving", "--runs", "1", "--turning-radius", "2", "--maps", str(tmp_path))
     assert said.startswith("--turning-radius: ") and said.endswith("leave out --maps\n")
+
+
+@pytest.mark.parametrize(("columns", "whole"), [(None, True), ("80", False)])
+def test_tables_are_whole_where_there_is_no_terminal(
+    monkeypatch: pytest.MonkeyPatch, columns: str | None, whole: bool
+) -> None:
+    drives = (gates.GateDrive(f"my_controllers:{'X' * 40}", 0.9, 30.0, 0, True, 0, 12.0),)
+    monkeypatch.setattr(gates, "run", lambda options, advance: gates.GatesReport(options, drives))
+    monkeypatch.delenv("COLUMNS", raising=False)
+    if columns:
+        monkeypatch.setenv("COLUMNS", columns)
+    result = CliRunner().invoke(app, ["experiment", "gates", "--runs", "1"])
+    assert result.exit_code == 0
+    heads = next(line for line in result.stdout.splitlines() if "gate m" in line or "…" in line)
+    assert all(head in heads for head in gates.HEAD) == whole and (drives[0].controller in result.stdout) == whole
