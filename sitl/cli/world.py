@@ -12,7 +12,7 @@ import typer
 from PIL import Image
 from pydantic import ValidationError
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture, replaced, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, picture, replaced, writable, written
 from companion.core.own_parts import OwnPartError
 from companion.storage.files import open_file
 from companion.storage.validation import alike, describe_first
@@ -58,6 +58,7 @@ def make(
         picture(image)
         given = _given(kind, set_ or [])
         mission = out / f"{kind.replace(':', '-')}-{seed}.toml"
+        apart((image,), (mission, mission.with_suffix(".png")))
         writable(mission)
         ground = made(kind, seed, given, movers)
         measures = ground.difficulty

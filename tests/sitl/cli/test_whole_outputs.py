@@ -108,3 +108,10 @@ def test_a_world_that_was_changed_is_not_made_again(name: str, tmp_path: Path) -
     other = next(one for one in made if one != file)
     other.unlink()
     assert make()[0] == 2 and not other.exists(), "nothing is written"
+
+
+def test_the_picture_does_not_take_the_place_of_the_world(tmp_path: Path) -> None:
+    place = ["--out", str(tmp_path), "--image", str(tmp_path / "clutter-1.png")]
+    result = CliRunner().invoke(app, ["world", "make", "clutter", "--seed", "1", *place])
+    assert result.exit_code == 2 and "is another file of this command" in result.output
+    assert not list(tmp_path.iterdir())
