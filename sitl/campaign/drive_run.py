@@ -16,6 +16,7 @@ from companion.core.interrupts import is_interrupt
 from companion.executive.mission_progress import TargetStatus
 from companion.mission.load import load_mission
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
+from companion.mission.sensor_tables import is_blind
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
@@ -23,13 +24,13 @@ from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.true_ways import Verdicts
 from sitl.campaign.wire_watch import WireWatch
-from sitl.campaign.worded import NOTHING, OWN, GroundSpec, SensorSpec, faults_of
+from sitl.campaign.worded import BLIND, NOTHING, OWN, GroundSpec, SensorSpec, faults_of
 from sitl.experiments.experiment import GUARD
 from sitl.experiments.off_model import off_model
 from sitl.experiments.time_bound import time_bound_s
 from sitl.generators.made_ground import MadeGround, NoWayError, made
 from sitl.lockstep import Drive, TrackPoint
-from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
+from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_faults, with_sensors
 from sitl.simulator import ROOM_REACH_M
 from sitl.world.movers import Mover
 from sitl.world.truth import STOOD_M_S, SimStart, Truth
@@ -153,7 +154,10 @@ def _mission_on(ground: MadeGround | None, spec: RunSpec, folder: Path) -> Missi
 
 def check_spec(spec: RunSpec, folder: Path) -> None:
     """Raises MissionError, MapError or ScenarioError for a run that cannot be driven at all."""
-    _mission_and_scenario(spec, folder)
+    mission, _ = _mission_and_scenario(spec, folder)
+    if mission.sitl is not None and is_blind(mission.sitl.sensors):
+        remedy = "name some there, or in the campaign's list sensors"
+        raise ScenarioError(f"{folder / spec.world}: sitl.sensors: there are none: {BLIND}; {remedy}")
 
 
 def _mission_and_scenario(spec: RunSpec, folder: Path) -> tuple[Mission, Scenario]:

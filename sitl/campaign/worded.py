@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
-from companion.mission.sensor_tables import Sensors, Share, sensors_from, sensors_given
+from companion.mission.sensor_tables import Sensors, Share, is_blind, sensors_from, sensors_given
 from companion.mission.tables import Table
 from companion.storage.validation import describe_first
 from sitl.faults.fault_file import FaultFileError, fault_of, load_faults
@@ -25,6 +25,7 @@ NOTHING = "none"
 """No faults."""
 OWN = "own"
 """The sensors that the mission names; generated ground is driven with ``USUAL_SENSORS``."""
+BLIND = "the companion does not drive without range data"
 BETWEEN_FAULTS = ";"
 MOST_MOVERS = 50
 
@@ -115,7 +116,9 @@ class SensorSpec:
         return cls(name, _valid(SensorChanges, values))
 
     def check(self, folder: Path) -> None:
-        """Raises ValueError for sensors that are not there."""
+        """Raises ValueError for sensors that are not there, and for none at all."""
+        if is_blind(self.name):
+            raise ValueError(f"{self.name!r}: {BLIND}; name a suite or a file with sensors")
         if self.name != OWN:
             sensors_from(sensors_given(self.name), folder, ValueError)
 

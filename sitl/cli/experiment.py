@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import typer
 from rich.console import Console
@@ -16,11 +18,12 @@ from companion.settings import Settings
 from companion.settings.versions import made_with
 from sitl.cli import experiment_options as given
 from sitl.cli.extras import statistics_fault
-from sitl.cli.named import names_in
 from sitl.experiments.experiment import OFF_MODEL, Checked, Experiment, ExperimentError, ExperimentReport, Options
 
 WITH_STATISTICS = ("barn", "gates", "killed-companion", "traffic", "wang-table4")
 EXIT_FAILED = 3
+WIDTH = 200
+"""Of the output where there is no terminal: no table is wider."""
 LINES = 10
 """Of progress, where there is no terminal for a bar."""
 
@@ -32,15 +35,15 @@ def experiment(
     jobs: given.Jobs = 1,
     maps: given.Maps = None,
     world: given.World = None,
-    planners: given.Planners = "",
+    planners: given.Planners = None,
     worlds: given.Worlds = None,
-    controllers: given.Controllers = "",
-    setups: given.Setups = "",
-    missions: given.Missions = "",
+    controllers: given.Controllers = None,
+    setups: given.Setups = None,
+    missions: given.Missions = None,
     guard: given.Guard = False,
     off: given.Off = OFF_MODEL,
     late: given.Late = 0.0,
-    outline: given.Outline = "",
+    outline: given.Outline = None,
     turning_radius: given.TurningRadius = 0.0,
     keep: given.Keep = None,
     json_file: given.JsonFile = None,
@@ -50,18 +53,17 @@ def experiment(
 
     Exit code 2: bad input; 3: soak: a collision, an error, growing memory; dead-companion, killed-companion: a contact.
     """
-    console = Console()
+    console = _console()
     try:
         _check(name, json_file, docs)
-        for option, listed in (("--planners", planners), ("--controllers", controllers), ("--missions", missions)):
-            if listed and not names_in(listed):
-                raise ExperimentError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
         runs = runs or (given.RUNS_OF_BARN if name == "barn" else given.RUNS)
         options = Options(
-            runs, seed, jobs, maps, tuple(world or ()), names_in(planners), worlds, names_in(controllers),
-            names_in(setups), guard, off, late, keep, names_in(missions), given.outline_m(outline), turning_radius,
+            runs, seed, jobs, maps, tuple(world or ()), given.names_given("--planners", planners), worlds,
+            given.names_given("--controllers", controllers), given.names_given("--setups", setups), guard, off, late,
+            keep, given.names_given("--missions", missions), given.outline_m(outline), turning_radius,
         )  # fmt: skip
         given.refuse_unused(name, options)
+        _check_keep(keep)
         report = _with_progress(name, options, console)
         _put_out(report, console, json_file, docs)
     except (ExperimentError, MapError, OutputError) as error:
@@ -72,6 +74,14 @@ def experiment(
         raise typer.Exit(EXIT_FAILED)
 
 
+def _console() -> Console:
+    """Into a file or pipe tables are whole: rich would take 80 columns there, and cut the headings."""
+    console = Console()
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = WIDTH
+    return console
+
+
 def _check(name: str, json_file: Path | None, docs: Path | None) -> None:
     """Before the work, not after it: a name, a library or a place that is not there."""
     if name not in given.EXPERIMENTS:
@@ -80,6 +90,20 @@ def _check(name: str, json_file: Path | None, docs: Path | None) -> None:
         raise ExperimentError(fault)
     writable(json_file)
     writable(docs and docs / "results.md")
+
+
+def _check_keep(keep: Path | None) -> None:
+    """Make the folder and try to write into it. Raises OutputError."""
+    if keep is None:
+        return
+    try:
+        keep.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=keep):
+            pass
+    except OSError as error:
+        raise OutputError(
+            f"--keep {keep}: cannot be written: {error.strerror or error}; name a folder that can be made"
+        ) from error
 
 
 def _with_progress(name: str, options: Options, console: Console) -> ExperimentReport:

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from sitl.campaign.campaign_file import MOST_RUNS
+from sitl.cli.named import names_in
 from sitl.experiments.experiment import OFF_MODEL, ExperimentError, Options
 
 EXPERIMENTS = (
@@ -43,12 +45,15 @@ TAKERS = {
     "--late": ("barn", "controllers", "gates", "killed-companion", "missions"),
     "--outline": ("gates",),
     "--turning-radius": ("driving",),
+    "--maps": (
+        "adaptive-control-points", "kwasniewski-maps", "kwasniewski-table1", "navigation", "driving", "dead-companion",
+        "killed-companion", "missions", "traffic", "sedighi-table1",
+    ),
     "--keep": (
         "barn", "controllers", "dead-companion", "driving", "gates", "killed-companion", "missions", "traffic",
     ),
 }  # fmt: skip
 """The experiments that each option is for; those that are not here are for all of them."""
-OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
 RUNS, RUNS_OF_BARN = 100, 10
 """Unless it is said; the second as the BARN challenge has it."""
 
@@ -63,6 +68,7 @@ Runs = Annotated[
     int | None,
     typer.Option(
         min=1,
+        max=MOST_RUNS,
         help="Runs, with consecutive seeds, on each map, mission or world; default: "
         f"{RUNS}, for barn {RUNS_OF_BARN}. kwasniewski-table1 makes at least 3.",
     ),
@@ -72,14 +78,18 @@ Jobs = Annotated[
     int, typer.Option(min=1, help="Processes (needs joblib). Results stay the same, but measured times get longer.")
 ]
 Maps = Annotated[
-    Path | None, typer.Option(help="Folder with the maps; default: missions/maps. sedighi-table1: more grids.")
+    Path | None,
+    typer.Option(
+        help=f"{_of('--maps')}: folder with the maps, and with the shipped missions beside it; default: missions/maps. "
+        "sedighi-table1: more grids."
+    ),
 ]
 World = Annotated[
     list[Path] | None,
     typer.Option(help=f"{_of('--world')}: another map, with its MovingAI scenario file beside it; may be repeated."),
 ]
 Planners = Annotated[
-    str,
+    str | None,
     typer.Option(help=f"{_of('--planners')}: names, separated by commas; default: all that apply."),
 ]
 Worlds = Annotated[
@@ -91,21 +101,21 @@ Worlds = Annotated[
     ),
 ]
 Controllers = Annotated[
-    str,
+    str | None,
     typer.Option(
         help=f"{_of('--controllers')}: what leads the rover, names separated by commas; default: all, for "
         "gates motion-ga, for dead-companion, killed-companion and missions points."
     ),
 ]
 Setups = Annotated[
-    str,
+    str | None,
     typer.Option(
         help="barn: guarded, strict (without the guard), jackal (a Jackal's limits), separated by commas; gates: "
         "one of the first two; default: guarded."
     ),
 ]
 Missions = Annotated[
-    str,
+    str | None,
     typer.Option(help=f"{_of('--missions')}: names of shipped missions, separated by commas; default: all."),
 ]
 Guard = Annotated[bool, typer.Option("--guard", help=f"{_of('--guard')}: with the guard on the autopilot.")]
@@ -118,7 +128,7 @@ Late = Annotated[
     typer.Option(min=0.0, max=2.0, help=f"{_of('--late')}: seconds that a message takes over the link, each way."),
 ]
 Outline = Annotated[
-    str,
+    str | None,
     typer.Option(
         metavar="LENGTHxWIDTH",
         help="gates: the rover's outline in metres, 2.0x0.5 for example; default: 0.9x0.7.",
@@ -143,9 +153,19 @@ JsonFile = Annotated[Path | None, typer.Option("--json", help="Write all figures
 Docs = Annotated[Path | None, typer.Option(help="Folder whose results.md and images/ are updated; created if missing.")]
 
 
-def outline_m(given: str) -> tuple[float, float] | None:
+def names_given(option: str, listed: str | None) -> tuple[str, ...]:
+    """The names of an option; none if it is not there. Raises ExperimentError for one that names nothing."""
+    if listed is None:
+        return ()
+    names = names_in(listed)
+    if not names:
+        raise ExperimentError(f"{option} {listed!r:.40}: names nothing; separate names by commas")
+    return names
+
+
+def outline_m(given: str | None) -> tuple[float, float] | None:
     """Length and width in metres. Raises ExperimentError."""
-    if not given:
+    if given is None:
         return None
     try:
         length_m, width_m = (float(one) for one in given.split("x"))
@@ -172,13 +192,14 @@ def refuse_unused(name: str, options: Options) -> None:
         "--late": options.late_s,
         "--outline": options.outline_m,
         "--turning-radius": options.turning_radius_m,
+        "--maps": options.maps,
         "--keep": options.keep,
     }
     for option, takers in TAKERS.items():
         if given[option] and name not in takers:
             listed = " and ".join(filter(None, (", ".join(takers[:-1]), takers[-1])))
             raise ExperimentError(f"{option}: {name} does not take it; the option is for {listed}")
-    if options.maps is not None and name in OWN_ENVIRONMENTS:
-        raise ExperimentError(f"--maps: {name} draws the paper's own environments, it reads no maps")
+    if options.turning_radius_m and options.maps is not None:
+        raise ExperimentError("--turning-radius: with it the random grounds alone are driven; leave out --maps")
     if options.turning_radius_m and options.worlds:
         raise ExperimentError("--turning-radius: with it the random grounds alone are driven; leave out --world")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from io import BytesIO
 from pathlib import Path
 from typing import Annotated
 
@@ -11,9 +12,9 @@ import typer
 from PIL import Image
 from pydantic import ValidationError
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, picture, replaced, writable, written
 from companion.core.own_parts import OwnPartError
-from companion.storage.files import whole_file
+from companion.storage.files import open_file
 from companion.storage.validation import alike, describe_first
 from sitl.generators.canvas import FINE_M
 from sitl.generators.kinds import GroundKind, Parameters, is_kind, parameters_of
@@ -51,17 +52,24 @@ def make(
 ) -> None:
     """Make a world of KIND with a mission from one side to the other, for rover-sitl drive; there is always a way.
 
-    Exit code 2: bad input, or no ground of these parameters has a way.
+    Exit code 2: bad input, no ground of these parameters has a way, or files with other content are there.
     """
     try:
         picture(image)
         given = _given(kind, set_ or [])
         mission = out / f"{kind.replace(':', '-')}-{seed}.toml"
+        apart((image,), (mission, mission.with_suffix(".png")))
         writable(mission)
         ground = made(kind, seed, given, movers)
         measures = ground.difficulty
-        with written(mission):
-            _write(ground, seed, given, measures, mission)
+        files = {
+            mission.with_suffix(".png"): _world(ground),
+            mission: _mission(ground, seed, given, measures, mission.with_suffix(".png").name).encode(),
+        }
+        _refuse_others(files)
+        for file, content in files.items():
+            with replaced(file) as new:
+                new.write_bytes(content)
         if image is not None:
             with written(image):
                 _draw(ground, seed, image)
@@ -112,11 +120,28 @@ def _lines(measures: Difficulty) -> list[str]:
     ]
 
 
-def _write(ground: MadeGround, seed: int, given: Parameters, measures: Difficulty, file: Path) -> None:
-    """The mission, and beside it the world as an image."""
-    world = file.with_suffix(".png")
-    with whole_file(world) as new:
-        Image.fromarray(np.where(ground.world.obstacles[::-1], 0, 255).astype(np.uint8)).save(new)
+def _refuse_others(files: dict[Path, bytes]) -> None:
+    """Nothing that somebody has changed, or made with other options, is lost. Raises WorldError or OutputError."""
+    for file, content in files.items():
+        with written(file):
+            try:
+                with open_file(file) as there:
+                    same = there.read(len(content) + 1) == content
+            except FileNotFoundError:
+                continue
+        if not same:
+            raise WorldError(f"{file}: is there with other content, and would be lost; choose another --out")
+
+
+def _world(ground: MadeGround) -> bytes:
+    """The image that is the world."""
+    image = BytesIO()
+    Image.fromarray(np.where(ground.world.obstacles[::-1], 0, 255).astype(np.uint8)).save(image, "png")
+    return image.getvalue()
+
+
+def _mission(ground: MadeGround, seed: int, given: Parameters, measures: Difficulty, world: str) -> str:
+    """The text of the mission in a world with this file's name."""
     start, goal = ground.start_m, ground.goal_m
     told = ", ".join(f"{name} {value:g}" for name, value in given.model_dump().items())
     measured = ", ".join(f"{name} {value:.3g}" for name, value in asdict(measures).items())
@@ -131,7 +156,7 @@ def _write(ground: MadeGround, seed: int, given: Parameters, measures: Difficult
         f"east_m = {goal[1] - start[1]:.2f}",
         "",
         "[sitl]",
-        f'world = "{world.name}"',
+        f'world = "{world}"',
         f"resolution_m = {FINE_M:g}",
         f"start = [{int(start[1] / FINE_M)}, {int(start[0] / FINE_M)}]",
         "heading_deg = 90.0",
@@ -148,8 +173,7 @@ def _write(ground: MadeGround, seed: int, given: Parameters, measures: Difficult
             f"route_m = [{route}]",
             "repeat = true",
         ]
-    with whole_file(file) as new:
-        new.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
 
 
 def _draw(ground: MadeGround, seed: int, file: Path) -> None:

@@ -74,6 +74,10 @@ def test_each_combination_is_one_run_for_each_seed_and_seeds_come_one_after_the_
         ),
         ('worlds = ["yard"]\nfaults = ["no.toml"]', "no.toml: cannot be read"),
         ('worlds = ["yard"]\nsensors = ["lidr"]', "sensors 1: unknown sensors 'lidr'"),
+        (
+            'worlds = ["yard"]\nsensors = ["lidar-360", "none"]',
+            "sensors 2: 'none': the companion does not drive without range data; name a suite or a file",
+        ),
         ('worlds = ["yard"]\nsensors = ["no.toml"]', "no.toml: cannot be read"),
         ('name = "../x"\nworlds = ["yard"]', "name: must match the pattern"),
         ('worlds = ["yard"]\nplanners = ["collections:OrderedDict"]', "has no plan; docs/planners.md shows one"),

@@ -8,13 +8,14 @@ from pathlib import Path
 import pytest
 
 from sitl.campaign import drive_run
-from sitl.campaign.drive_run import drive
+from sitl.campaign.drive_run import check_spec, drive
 from sitl.campaign.policies import Policy, broken
 from sitl.campaign.run_spec import RunSpec
 from sitl.experiments.time_bound import ways_m
 from sitl.generators.made_ground import made
 from sitl.generators.measures import Difficulty
 from sitl.lockstep import Drive, TrackPoint
+from sitl.scenario import ScenarioError
 
 SPEC = RunSpec("maze", "hybrid", "points", "own", "none", False, 0.0, 0.0, "shipped", 1, 100.0, "{}")
 
@@ -88,3 +89,13 @@ def test_settings_of_a_run_have_its_planner_its_controller_and_its_variant() -> 
     settings = drive_run.settings_of(spec)
     assert settings.navigator.planner == "astar" and settings.guidance.controller == "motion-ga"
     assert settings.guidance.clearance_m == 0.4 and settings.link.range_rate_hz == 20.0
+
+
+def test_a_mission_without_range_sensors_is_driven_with_those_of_the_campaign_alone(tmp_path: Path) -> None:
+    mission = "[[target]]\nnorth_m = 1.0\neast_m = 2.0\n[sitl]\nsensors = 'none'\n"
+    (tmp_path / "blind.toml").write_text(mission)
+    check_spec(replace(SPEC, world="blind.toml", sensors="lidar-360"), tmp_path)
+    with pytest.raises(ScenarioError) as caught:
+        check_spec(replace(SPEC, world="blind.toml"), tmp_path)
+    said = str(caught.value)
+    assert said.startswith(f"{tmp_path / 'blind.toml'}: sitl.sensors: ") and "the campaign's list sensors" in said
