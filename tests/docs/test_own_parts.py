@@ -203,6 +203,22 @@ def test_a_package_may_register_a_world(tmp_path: Path, monkeypatch: pytest.Monk
     assert GroundSpec.of("orchard row_m=3") is not None
 
 
+def test_a_controller_that_fails_on_the_way_ends_the_drive_with_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dice = written("planners.md", "Dice", tmp_path, monkeypatch)
+    source, late = Path("dice.py").read_text(encoding="utf-8"), "if passed_s > 0.04 and problem.start.speed_m_s > 0.5: "
+    plan = "def plan(self, problem, passed_s):\n"
+    Path("dice.py").write_text(source.replace(plan, f"{plan}        {late}raise ValueError('my bug')\n"))
+    Path("dice.toml").write_text(f'guidance.controller = "{dice}"\n')
+    mission = str(MAPS.parent / "first-drive" / "gate.toml")
+    driven = CliRunner().invoke(sitl, ["drive", mission, "--settings", "dice.toml"])
+    assert isinstance(driven.exception, OwnPartError), driven.output
+    assert re.fullmatch(
+        r"controller 'dice:Dice' fails: ValueError: my bug \(dice.py, line \d+\)", str(driven.exception)
+    )
+
+
 @pytest.mark.thorough
 def test_the_controller_of_the_page_drives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dice = written("planners.md", "Dice", tmp_path, monkeypatch)

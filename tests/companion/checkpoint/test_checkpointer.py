@@ -258,3 +258,6 @@ def test_of_a_large_map_only_what_was_seen_is_copied_and_always_in_the_same_rows
         places.append([(part.first_row, part.rows) for part in parts])
         assert sum(part.rows * part.columns for part in parts) <= 64 * 580
     assert places[0] == places[1] == places[2]
+    copy = next(_map_parts(evidence))
+    evidence.log_odds[:] = 7.0
+    assert not any(cells.any() for cells in copy.values()), "what is told later is what it was"

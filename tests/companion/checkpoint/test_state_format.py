@@ -160,3 +160,12 @@ def test_another_version_is_named_and_not_called_damaged() -> None:
     with pytest.raises(StateError, match="format '7'") as caught:
         decode_state(sealed(MAGIC + b"7\n" + b"whatever"))
     assert not isinstance(caught.value, DamagedStateError)
+
+
+def test_a_part_that_no_run_writes_takes_no_memory() -> None:
+    """100 million cells of one value would be 400 kB in the file."""
+    ground = {**a_state().ground.model_dump(), "width": 2000, "height": 1990, "subdivisions": 5}
+    wide = replaced(a_state().model_dump(mode="json"), ("ground",), ground)
+    data = zlib.compress(bytes(100))
+    with pytest.raises(DamagedStateError, match="too large"):
+        decode_state(forged({"state": wide, "parts": [["log_odds", 0, 9950, 0, 10000, len(data)]]}, data))

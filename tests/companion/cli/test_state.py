@@ -75,6 +75,15 @@ def test_a_state_file_keeps_the_older_state_when_the_first_rows_come(tmp_path: P
     assert not path.exists() and before.read_bytes() == b"older"
 
 
+def test_a_newer_part_of_the_same_rows_takes_the_place_of_the_older_one(tmp_path: Path) -> None:
+    file, encoded = StateFile(tmp_path / "mission.state", OsDisk()), []
+    for columns in (2, 4):
+        part = MapPart("log_odds", 0, 1, 0, columns), MapPart("log_odds", 1, 1, 0, columns)
+        file.apply(StateUpdate({one: np.full((1, columns), columns, np.float32) for one in part}))
+        encoded.append(sorted(one.columns for one, _ in file._parts.values()))
+    assert encoded == [[2, 2], [4, 4]]
+
+
 def test_a_mission_that_has_ended_is_told_and_not_driven_again(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     values = {**a_state().progress.model_dump(), "statuses": ["reached"], "phase": "done", "index": 1}

@@ -7,6 +7,7 @@ import mmap
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -409,6 +410,7 @@ def test_a_moved_map_has_each_cell_where_it_belongs(cells: np.ndarray, stamps: n
     assert move(evidence, 0.25 * by.y, 0.25 * by.x) == (0.25 * by.y, 0.25 * by.x)
     for now, before in ((evidence.log_odds, cells), (evidence.stamps, stamps)):
         assert (now == shifted(before, before.shape, by)).all()
+    assert_noted(evidence)
 
 
 @given(arrays(np.float32, (8, 12), elements=CELLS, fill=st.just(0.0)), arrays(np.int32, (8, 12)))
@@ -607,10 +609,7 @@ def test_after_every_scan_the_weights_are_those_of_a_map_that_is_computed_anew(f
         restore(again, evidence.log_odds, evidence.penalty)
         assert np.array_equal(evidence.grid.weights, again.grid.weights)
         assert np.array_equal(again.grid.weights, weights_of_all_evidence(again))
-        noted = np.zeros(evidence.log_odds.shape, np.bool_)
-        for window in evidence.seen.windows():
-            noted[window] = True
-        assert noted[(evidence.log_odds != 0.0) | (evidence.stamps != 0)].all()
+        assert_noted(evidence)
         obstacles.append(int((evidence.grid.weights >= 1.0).sum()))
     assert len(set(obstacles)) > 10
 
@@ -624,3 +623,55 @@ def weights_of_all_evidence(evidence: EvidenceMap) -> np.ndarray:
     weighs(evidence.log_odds, evidence.base.weights, evidence.penalty, weights, whole, settings.occupied_at, radius)
     soften(weights, whole, evidence.base.fields(settings.soft_reach_m), settings.soft_cost, MAX_SOFT_WEIGHT)
     return weights
+
+
+def assert_noted(evidence: EvidenceMap) -> None:
+    """That everything that is not zero counts as seen."""
+    noted = np.zeros(evidence.log_odds.shape, np.bool_)
+    for window in evidence.seen.windows():
+        noted[window] = True
+    assert noted[(evidence.log_odds != 0.0) | (evidence.stamps != 0)].all()
+
+
+PLACES = st.tuples(st.integers(0, 159), st.integers(0, 159))
+
+
+@given(
+    st.tuples(st.integers(1, 80), st.integers(1, 80)),
+    st.sampled_from(["circle", "outline"]),
+    st.lists(PLACES, max_size=3),
+    st.lists(PLACES, max_size=1),
+    st.lists(PLACES, max_size=1),
+)
+def test_what_was_seen_anywhere_bears_on_the_fields_round_it_and_on_no_others(
+    size: tuple[int, int], keeps: str, cells: list[Any], closed: list[Any], penalties: list[Any]
+) -> None:
+    """Single obstacles, one that the mission closes, and one by penalty, on large and tiny maps."""
+    base = empty_grid(*size, 0.5)
+    for x, y in closed:
+        base.weights[y % size[1], x % size[0]] = 1.0
+    evidence = new_map(base, 0.8, SETTINGS.model_copy(update={"keeps": keeps, "evidence_m": 0.25}))
+    for x, y in ((east % (2 * size[0]), north % (2 * size[1])) for east, north in cells):
+        evidence.log_odds[y, x] = 3.0
+        evidence.seen.add(x, y, x + 1, y + 1)
+    for x, y in penalties:
+        evidence.penalty[y % size[1], x % size[0]] = 1.0
+    rebase(evidence, evidence.base)
+    assert np.array_equal(evidence.grid.weights, weights_of_all_evidence(evidence))
+
+
+@given(
+    st.lists(st.sampled_from([math.nan, math.inf, 0.3, 1.0, 3.0]), min_size=4, max_size=4),
+    st.floats(0.1, 3.0),
+    st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)),
+    st.floats(0.0, 0.6),
+)
+def test_all_that_a_scan_changes_counts_as_seen(
+    range_m: list[float], radius_m: float, origin_m: tuple[float, float], depth_m: float
+) -> None:
+    settings = SETTINGS.model_copy(update={"evidence_m": 0.05, "hit_depth_m": depth_m})
+    evidence = new_map(empty_grid(40, 40, 0.25), radius_m, settings)
+    one = replace(scan(np.array(range_m), np.array([0.0, 1.5, 3.0, 4.5])), empty_m=2.0, origin_m=origin_m)
+    integrate(evidence, Pose(5.0, 5.0, 0.7, 0.0), one, 1)
+    assert (evidence.log_odds != 0.0).any()
+    assert_noted(evidence)
