@@ -207,9 +207,9 @@ def test_a_controller_that_fails_on_the_way_ends_the_drive_with_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dice = written("planners.md", "Dice", tmp_path, monkeypatch)
-    source, late = Path("dice.py").read_text(encoding="utf-8"), "if passed_s > 0.04 and problem.start.speed_m_s > 0.5: "
-    plan = "def plan(self, problem, passed_s):\n"
-    Path("dice.py").write_text(source.replace(plan, f"{plan}        {late}raise ValueError('my bug')\n"))
+    source, plan = Path("dice.py").read_text(encoding="utf-8"), "def plan(self, problem, passed_s):\n"
+    late = "Dice.calls = getattr(Dice, 'calls', 0) + 1\n        if Dice.calls > 20: raise ValueError('my bug')"
+    Path("dice.py").write_text(source.replace(plan, f"{plan}        {late}\n"))
     Path("dice.toml").write_text(f'guidance.controller = "{dice}"\n')
     mission = str(MAPS.parent / "first-drive" / "gate.toml")
     driven = CliRunner().invoke(sitl, ["drive", mission, "--settings", "dice.toml"])

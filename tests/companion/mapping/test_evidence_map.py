@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -633,6 +633,15 @@ def assert_noted(evidence: EvidenceMap) -> None:
     assert noted[(evidence.log_odds != 0.0) | (evidence.stamps != 0)].all()
 
 
+def test_what_was_seen_counts_as_seen_where_it_has_moved_to() -> None:
+    evidence = new_map(empty_grid(40, 40), RADIUS_M, SETTINGS.model_copy(update={"evidence_m": 0.25}))
+    evidence.log_odds[5, 5] = 3.0
+    evidence.seen.add(5, 5, 6, 6)
+    move(evidence, 20.0, 15.0)
+    assert evidence.log_odds[85, 65] == 3.0
+    assert_noted(evidence)
+
+
 PLACES = st.tuples(st.integers(0, 159), st.integers(0, 159))
 
 
@@ -643,6 +652,8 @@ PLACES = st.tuples(st.integers(0, 159), st.integers(0, 159))
     st.lists(PLACES, max_size=1),
     st.lists(PLACES, max_size=1),
 )
+@example((5, 60), "circle", [(4, 50), (7, 75)], [], [])
+@example((13, 60), "outline", [(12, 50)], [], [])
 def test_what_was_seen_anywhere_bears_on_the_fields_round_it_and_on_no_others(
     size: tuple[int, int], keeps: str, cells: list[Any], closed: list[Any], penalties: list[Any]
 ) -> None:
@@ -671,7 +682,7 @@ def test_all_that_a_scan_changes_counts_as_seen(
 ) -> None:
     settings = SETTINGS.model_copy(update={"evidence_m": 0.05, "hit_depth_m": depth_m})
     evidence = new_map(empty_grid(40, 40, 0.25), radius_m, settings)
-    one = replace(scan(np.array(range_m), np.array([0.0, 1.5, 3.0, 4.5])), empty_m=2.0, origin_m=origin_m)
-    integrate(evidence, Pose(5.0, 5.0, 0.7, 0.0), one, 1)
+    one = replace(scan(np.array(range_m), 0.5 * math.pi * np.arange(4)), empty_m=2.0, origin_m=origin_m)
+    integrate(evidence, Pose(5.0, 5.0, 0.0, 0.0), one, 1)
     assert (evidence.log_odds != 0.0).any()
     assert_noted(evidence)
