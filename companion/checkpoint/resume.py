@@ -30,7 +30,7 @@ from companion.executive.laps import LapStart
 from companion.executive.mission_executor import ORIGIN_MOVED_M, MissionExecutor
 from companion.executive.mission_layout import MissionLayout, apart_m, from_home, lay
 from companion.executive.mission_progress import MissionPhase, MissionProgress
-from companion.mapping.evidence_map import restore, shifted
+from companion.mapping.map_edits import restore, shifted
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.do_commands import DoCommand
 from companion.mission.mission import Mission, OnBlocked, Patrol

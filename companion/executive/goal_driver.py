@@ -23,7 +23,7 @@ from companion.core.frames import NedPoint
 from companion.core.grid import Cell
 from companion.core.own_parts import OwnKind, blamed
 from companion.core.rover_limits import RoverLimits
-from companion.mapping.evidence_map import forget_weak_evidence
+from companion.mapping.map_edits import forget_weak_evidence
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import (
     Action,

@@ -49,7 +49,8 @@ from companion.executive.mission_progress import (
 )
 from companion.executive.open_gaps import open_gap_m
 from companion.executive.return_path import Refuge, Trail, refuges
-from companion.mapping.evidence_map import EvidenceMap, forget, integrate, look_again, move
+from companion.mapping.evidence_map import EvidenceMap, integrate
+from companion.mapping.map_edits import forget, look_again, move
 from companion.mapping.map_files import save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.do_commands import DoCommand

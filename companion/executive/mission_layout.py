@@ -15,7 +15,9 @@ from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import OBSTACLE, Grid, inflated
 from companion.executive.command_progress import carried as carried_commands
 from companion.executive.mission_progress import MissionProgress, relaid
-from companion.mapping.evidence_map import EvidenceMap, known_fields, new_map, occupied_fields, rebase
+from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.mapping.map_edits import rebase
+from companion.mapping.map_queries import known_fields, occupied_fields
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import Bounds
 from companion.mission.check import MAX_GRID_FIELDS

@@ -27,7 +27,8 @@ from companion.core.grid import empty_grid
 from companion.core.own_parts import OwnKind, blamed
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
-from companion.mapping.evidence_map import integrate, move, new_map, penalise
+from companion.mapping.evidence_map import integrate, new_map, penalise
+from companion.mapping.map_edits import move
 from companion.mapping.map_queries import clearance_m, look_along, unseen_beside
 from companion.mission.bounds import Bounds
 from companion.perception.object_tracker import ObjectTracker

@@ -4,7 +4,7 @@ The raster is finer than the fields, so that the free ground beside a thin post 
 field. A field is an obstacle when something was seen in it, or when the rover standing in its middle would touch
 something; for planned motions (``keeps`` "outline") when there is no place in it where the rover would not, if fields
 are so small that no obstacle fits between two such places. Beside obstacles the mission's own weight is raised (soft
-cost). What can be asked of the map is in ``map_queries``.
+cost). What can be asked of the map is in ``map_queries``, what else is done to it in ``map_edits``.
 
 Nouns: evidence map, evidence.
 """
@@ -12,10 +12,9 @@ Nouns: evidence map, evidence.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,7 @@ from companion.mapping.evidence_kernels import (
     weigh_roomy,
 )
 from companion.mapping.lazy_zeros import lazy_zeros
-from companion.mapping.seen_rows import SeenRows, Window
+from companion.mapping.seen_rows import SeenRows
 from companion.mapping.sensor_agreement import SensorAgreement
 from companion.settings import MappingSettings
 
@@ -53,10 +52,10 @@ class EvidenceMap:
 
     ``log_odds``: shape (height * subdivisions, width * subdivisions), indexed [y, x]: 0 unknown, below 0 seen free,
     from ``settings.occupied_at`` on an obstacle. ``stamps``: of the scan that changed a cell last, 0 where none did: an
-    unknown cell with a stamp was an obstacle that is forgotten. ``seen``: where either is
-    not 0. ``base`` holds the mission's own weights (obstacles in
-    it are never forgotten: they are fences or prior knowledge), ``penalty`` what experience adds. The arrays belong to
-    the map and are changed in place by ``integrate``; ``grid`` is always up to date.
+    unknown cell with a stamp was an obstacle that is forgotten. ``seen``: where either is not 0. ``base`` holds the
+    mission's own weights (obstacles in it are never forgotten: they are fences or prior knowledge), ``penalty`` what
+    experience adds. The arrays belong to the map and are changed in place by ``integrate``; ``grid`` is always up to
+    date.
     """
 
     base: Grid
@@ -98,7 +97,7 @@ def new_map(base: Grid, rover_radius_m: float, settings: MappingSettings) -> Evi
         settings=settings,
         seen=SeenRows(*shape),
     )
-    _refresh_all(evidence)
+    refresh_all(evidence)
     return evidence
 
 
@@ -157,157 +156,6 @@ def penalise(evidence: EvidenceMap, cell: Cell, amount: float) -> None:
         evidence.penalty[cell.y, cell.x] += amount
         reach = _soft_reach(evidence) + 1
         _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
-
-
-def forget(evidence: EvidenceMap) -> None:
-    """Drop all that was seen (the local frame has moved under it); fences and prior knowledge stay."""
-    for window in evidence.seen.windows():
-        evidence.log_odds[window] = 0.0
-    evidence.penalty.fill(0.0)
-    evidence.agreement.clear()
-    _refresh_all(evidence)
-
-
-def move(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[float, float]:
-    """Move all that was seen by whole cells; fences and prior knowledge stay. Returns how far, metres north and east.
-
-    What leaves the grid is lost, and what comes in is unknown. Penalties belong to fields and move by whole ones.
-    """
-    side_m = evidence.evidence_m
-    by = Cell(round(east_m / side_m), round(north_m / side_m))
-    by_fields = Cell(round(by.x / evidence.subdivisions), round(by.y / evidence.subdivisions))
-    for raster in (evidence.log_odds, evidence.stamps):
-        parts = [(window, raster[window].copy()) for window in evidence.seen.windows()]
-        for window, _ in parts:
-            raster[window] = 0
-        for window, part in parts:
-            _put(part, raster, window, by)
-    evidence.seen.take(evidence.seen.moved(by))
-    evidence.penalty[:] = shifted(evidence.penalty, evidence.penalty.shape, by_fields)
-    evidence.agreement.clear()
-    _refresh_all(evidence)
-    return by.y * side_m, by.x * side_m
-
-
-def shifted(raster: NDArray[Any], shape: tuple[int, ...], by: Cell) -> NDArray[Any]:
-    """A raster on another one of this shape, moved by ``by`` to the east and north; zero where it says nothing."""
-    result = lazy_zeros(shape, raster.dtype)
-    for window in SeenRows.of(raster).windows():
-        _put(raster[window], result, window, by)
-    return result
-
-
-def _put(part: NDArray[Any], raster: NDArray[Any], window: Window, by: Cell) -> None:
-    """Write what was in a window, and is not 0, elsewhere; what lies outside is lost."""
-    rows, columns = part.shape
-    y, x = window[0].start + by.y, window[1].start + by.x
-    y0, x0 = max(0, y), max(0, x)
-    y1, x1 = min(raster.shape[0], y + rows), min(raster.shape[1], x + columns)
-    if y0 < y1 and x0 < x1:
-        part = part[y0 - y : y1 - y, x0 - x : x1 - x]
-        np.copyto(raster[y0:y1, x0:x1], part, where=part != 0)
-
-
-def rebase(evidence: EvidenceMap, base: Grid) -> None:
-    """Other weights of the mission's own (of a grid that lies as before); what was seen stays."""
-    evidence.base.weights[:] = base.weights
-    _refresh_all(evidence)
-
-
-def restore(
-    evidence: EvidenceMap,
-    log_odds: NDArray[np.float32],
-    penalty: NDArray[np.float32],
-    *,
-    obstacles_alone: bool = False,
-) -> None:
-    """Take over what an earlier run had seen, and what experience had added; shapes as in the map.
-
-    ``obstacles_alone``: no ground counts as seen free, and obstacles keep the least evidence that still makes them
-    obstacles.
-    """
-    settings = evidence.settings
-    for window in evidence.seen.windows():
-        evidence.log_odds[window] = 0.0
-    for window in SeenRows.of(log_odds).windows():
-        seen = np.clip(log_odds[window], -settings.free_limit, settings.limit)
-        if obstacles_alone:
-            seen = np.where(seen >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
-        evidence.log_odds[window] = seen
-        evidence.seen.add(window[1].start, window[0].start, window[1].stop, window[0].stop)
-    np.maximum(penalty, 0.0, out=evidence.penalty)
-    _refresh_all(evidence)
-
-
-def forget_weak_evidence(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
-    """Forget, before giving up, what may be an error of sensor or position, so that it is looked at again.
-
-    That is weak evidence of obstacles anywhere (below ``settings.sure_at``), any evidence of obstacles within
-    ``reach_m`` of the place, and all penalties. Returns whether there was any.
-    """
-    settings, (x, y) = evidence.settings, evidence.frame.xy(point)
-    reach, found = evidence.frame.cells(reach_m), bool((evidence.penalty > 0.0).any())
-    for window in evidence.seen.windows():
-        seen = evidence.log_odds[window]
-        occupied = seen >= settings.occupied_at
-        doubtful = occupied & (seen < settings.sure_at)
-        near = _round(y, reach, window[0].start), _round(x, reach, window[1].start)
-        doubtful[near] |= occupied[near]
-        found |= bool(doubtful.any())
-        _forget_cells(evidence, window, doubtful)
-    _forget_penalties(evidence)
-    return found
-
-
-def _round(place: float, reach: float, first: int) -> slice:
-    """The cells within reach of a place along one axis, counted from the ``first`` of a window."""
-    return slice(max(0, int(place - reach) - first), max(0, int(place + reach) + 1 - first))
-
-
-def look_again(evidence: EvidenceMap, since_stamp: int) -> None:
-    """Forget obstacles that no scan has touched since then, and all penalties: what stood there may have opened.
-
-    The ground becomes unknown, not free: whoever goes there looks first. What the mission itself closed stays.
-    """
-    for window in evidence.seen.windows():
-        occupied = evidence.log_odds[window] >= evidence.settings.occupied_at
-        _forget_cells(evidence, window, occupied & (evidence.stamps[window] < since_stamp))
-    _forget_penalties(evidence)
-
-
-def _forget_cells(evidence: EvidenceMap, window: Window, cells: NDArray[np.bool_]) -> None:
-    """These of a window are unknown again, and remembered as once seen, also those that an earlier run saw."""
-    evidence.log_odds[window][cells] = 0.0
-    stamps = evidence.stamps[window]
-    stamps[cells] = np.maximum(stamps[cells], 1)
-
-
-def _forget_penalties(evidence: EvidenceMap) -> None:
-    evidence.penalty.fill(0.0)
-    _refresh_all(evidence)
-
-
-def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
-    """Shape (height, width): True where at least one evidence cell of the field has been seen."""
-    return _fields_where(evidence, lambda log_odds: log_odds != 0.0)
-
-
-def occupied_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
-    """Shape (height, width): True where something was seen in the field itself, however wide the rover is."""
-    return _fields_where(evidence, lambda log_odds: log_odds >= evidence.settings.occupied_at)
-
-
-def _fields_where(
-    evidence: EvidenceMap, holds: Callable[[NDArray[np.float32]], NDArray[np.bool_]]
-) -> NDArray[np.bool_]:
-    # Rows of cells first, then every s-th column: ten times as fast as both at once.
-    s, fields = evidence.subdivisions, np.zeros((evidence.base.height, evidence.base.width), np.bool_)
-    for rows, columns in evidence.seen.windows(s):
-        cells = holds(evidence.log_odds[rows, columns])
-        of_rows = np.logical_or.reduce(cells.reshape(cells.shape[0] // s, s, -1), axis=1)
-        of_fields = np.logical_or.reduce([of_rows[:, column::s] for column in range(s)])
-        fields[rows.start // s : rows.stop // s, columns.start // s : columns.stop // s] = of_fields
-    return fields
 
 
 def _note_seen(evidence: EvidenceMap, begin: NedPoint, scan: RangeScan, range_m: NDArray[np.float64]) -> None:
@@ -384,7 +232,7 @@ def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
     _soften(evidence, window)
 
 
-def _refresh_all(evidence: EvidenceMap) -> None:
+def refresh_all(evidence: EvidenceMap) -> None:
     """Recompute all weights. Evidence counts only near what was seen, and at the edges of the map."""
     weights = evidence.grid.weights
     np.add(evidence.base.weights, evidence.penalty, out=weights)

@@ -1,4 +1,5 @@
-"""Map queries, in metres: what lies along a line or an arc, the nearest obstacle, how a line would be followed.
+"""Map queries, in metres: what lies along a line or an arc, the nearest obstacle, how a line would be followed. And
+which fields have been seen, or hold something.
 
 Nouns: map queries, clearance.
 """
@@ -6,10 +7,12 @@ Nouns: map queries, clearance.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.core.frames import NedPoint, Pose
 from companion.mapping import arc_kernels
@@ -190,3 +193,26 @@ class ArcQueries:
             return at, 0.0 if beyond else self._frame.metres(float(np.hypot(*(line[-1] - here))))
         rest = line[at:] - np.vstack((here, line[at:-1]))
         return at, self._frame.metres(float(np.hypot(*rest.T).sum()))
+
+
+def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
+    """Shape (height, width): True where at least one evidence cell of the field has been seen."""
+    return _fields_where(evidence, lambda log_odds: log_odds != 0.0)
+
+
+def occupied_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
+    """Shape (height, width): True where something was seen in the field itself, however wide the rover is."""
+    return _fields_where(evidence, lambda log_odds: log_odds >= evidence.settings.occupied_at)
+
+
+def _fields_where(
+    evidence: EvidenceMap, holds: Callable[[NDArray[np.float32]], NDArray[np.bool_]]
+) -> NDArray[np.bool_]:
+    # Rows of cells first, then every s-th column: ten times as fast as both at once.
+    s, fields = evidence.subdivisions, np.zeros((evidence.base.height, evidence.base.width), np.bool_)
+    for rows, columns in evidence.seen.windows(s):
+        cells = holds(evidence.log_odds[rows, columns])
+        of_rows = np.logical_or.reduce(cells.reshape(cells.shape[0] // s, s, -1), axis=1)
+        of_fields = np.logical_or.reduce([of_rows[:, column::s] for column in range(s)])
+        fields[rows.start // s : rows.stop // s, columns.start // s : columns.stop // s] = of_fields
+    return fields

@@ -17,7 +17,6 @@ from companion.core.grid import Cell
 
 Window = tuple[slice, slice]
 """Rows and columns of a raster."""
-Raster = NDArray[np.generic]
 STRIP = 16
 """Rows that are looked at together. More hold more that was not seen, of a drive that leads across the rows aslant."""
 
@@ -62,19 +61,15 @@ class SeenRows:
             if x0 < x1:
                 yield slice(y, min(y + rows, len(self._first))), slice(x0 // step * step, -(-x1 // step) * step)
 
-    def take(self, other: SeenRows) -> None:
-        """Hold what another one of the same raster holds, and nothing else."""
-        self._first[:], self._last[:] = other._first, other._last
-
-    def moved(self, by: Cell) -> SeenRows:
-        """Of the same raster, when all of it has moved east and north; what leaves it is lost."""
-        result, height = SeenRows(len(self._first), self._width), len(self._first)
+    def move(self, by: Cell) -> None:
+        """All of it has moved east and north; what leaves the raster is lost."""
+        height, width = len(self._first), self._width
         rows = np.flatnonzero(self._last >= 0)
         rows = rows[(rows + by.y >= 0) & (rows + by.y < height)]
-        first, last = np.maximum(self._first[rows] + by.x, 0), np.minimum(self._last[rows] + by.x, self._width - 1)
+        first, last = np.maximum(self._first[rows] + by.x, 0), np.minimum(self._last[rows] + by.x, width - 1)
         inside = first <= last
-        result._first[rows[inside] + by.y], result._last[rows[inside] + by.y] = first[inside], last[inside]
-        return result
+        self._first[:], self._last[:] = width, -1
+        self._first[rows[inside] + by.y], self._last[rows[inside] + by.y] = first[inside], last[inside]
 
 
 @njit(cache=True, nogil=True)

@@ -18,7 +18,7 @@ from companion.control.motion_controller import MotionChoice, MotionController
 from companion.control.motion_kernels import BLOCKED_S, way_of
 from companion.core.frames import Pose
 from companion.core.grid import OBSTACLE, Grid
-from companion.mapping.evidence_map import known_fields
+from companion.mapping.map_queries import known_fields
 from companion.navigation.field_step import Decision, NavState, arrived, follows_clear_path
 from companion.navigation.turning_cost import with_turning_cost
 from companion.planning.hybrid import Hybrid

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from companion.app import Status
 from companion.executive.mission_progress import TargetStatus
-from companion.mapping.evidence_map import EvidenceMap, restore
+from companion.mapping.evidence_map import EvidenceMap
+from companion.mapping.map_edits import restore
 from companion.mission.mission import Mission
 from companion.recording.recorder import NullRecorder
 from sitl.experiments.controllers import mission_on, scenario_on

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE
-from companion.mapping.evidence_map import known_fields
+from companion.mapping.map_queries import known_fields
 from companion.viewer.map_figure import Extent, MapFigure, Places, corners_of, extent_of, framed
 
 if TYPE_CHECKING:

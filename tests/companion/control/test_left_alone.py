@@ -24,7 +24,8 @@ from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
-from companion.mapping.evidence_map import EvidenceMap, forget_weak_evidence, new_map
+from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.mapping.map_edits import forget_weak_evidence
 from companion.mission.bounds import Bound, Bounds
 from companion.safety.reasons import SetpointFault
 from companion.settings import Settings

@@ -12,7 +12,8 @@ from companion.control.motion_kernels import Body
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.core.frames import NedPoint
 from companion.core.grid import empty_grid
-from companion.mapping.evidence_map import EvidenceMap, forget_weak_evidence, new_map
+from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.mapping.map_edits import forget_weak_evidence
 from companion.settings import Settings
 
 SETTINGS = Settings()

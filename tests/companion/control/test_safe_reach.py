@@ -15,7 +15,8 @@ from companion.control.safe_reach import BACK_LEAST_M_S, arc_is_free, backing_sp
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
-from companion.mapping.evidence_map import EvidenceMap, look_again, new_map
+from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.mapping.map_edits import look_again
 from companion.settings import Settings
 
 SETTINGS = Settings()

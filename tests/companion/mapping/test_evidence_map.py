@@ -19,23 +19,9 @@ from companion.core.frames import NedPoint, Pose
 from companion.core.grid import BASE_WEIGHT, Cell, Grid, empty_grid
 from companion.core.scan import WIRED, RangeScan
 from companion.mapping.evidence_kernels import soften, weigh, weigh_roomy
-from companion.mapping.evidence_map import (
-    MAX_SOFT_WEIGHT,
-    EvidenceMap,
-    forget,
-    forget_weak_evidence,
-    integrate,
-    known_fields,
-    look_again,
-    move,
-    new_map,
-    occupied_fields,
-    penalise,
-    rebase,
-    restore,
-    shifted,
-)
-from companion.mapping.map_queries import clearance_m, look_along
+from companion.mapping.evidence_map import MAX_SOFT_WEIGHT, EvidenceMap, integrate, new_map, penalise
+from companion.mapping.map_edits import forget, forget_weak_evidence, look_again, move, rebase, restore, shifted
+from companion.mapping.map_queries import clearance_m, known_fields, look_along, occupied_fields
 from companion.mapping.sensor_agreement import BELIEVED_S
 from companion.settings import MappingSettings
 

@@ -13,7 +13,8 @@ from hypothesis.extra.numpy import arrays
 
 from companion.core.frames import NedPoint
 from companion.core.grid import empty_grid
-from companion.mapping.evidence_map import EvidenceMap, forget, new_map
+from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.mapping.map_edits import forget
 from companion.settings import Settings
 from companion.viewer.map_tiles import (
     GLANCES_A_SECOND,

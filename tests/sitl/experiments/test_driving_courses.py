@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 
 from companion.core.frames import NedPoint
 from companion.core.grid import empty_grid
-from companion.mapping.evidence_map import new_map, occupied_fields
+from companion.mapping.evidence_map import new_map
+from companion.mapping.map_queries import occupied_fields
 from companion.mission.mission import Mission
 from companion.settings import Settings
 from sitl.cli.commands import app
