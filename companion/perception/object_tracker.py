@@ -1,10 +1,12 @@
 """Object tracker: which of the things that the range sensors see are moving, and where to.
 
 Ground on which something stands was never seen free. So readings count that end on ground that had been seen free all
-round. So do those of a narrow thing that stands alone, with nothing near on either side; but what stands seems to move,
-too, when it is seen from another side, so such a thing must be faster. Where the edge of the view cuts one off, its
-other side is followed. Readings that lie together are one thing, and a thing whose place changes evenly from scan to
-scan moves. The map does not use this: there a moving thing is evidence like any other, and is freed behind it.
+round, unless they are a part of something of which most stands on other ground: a wall, a piece of which was taken for
+free ground because the position was not exact. So do those of a narrow thing that stands alone, with nothing near on
+either side; but what stands seems to move, too, when it is seen from another side, so such a thing must be faster, and
+it is not looked for while the rover turns quickly. Where the edge of the view cuts one off, its other side is followed.
+Readings that lie together are one thing, and a thing whose place changes evenly from scan to scan moves. The map does
+not use this: there a moving thing is evidence like any other, and is freed behind it.
 
 Nouns: object tracker.
 """
@@ -30,10 +32,17 @@ Points = NDArray[np.float64]
 
 FREE_AT = -0.5
 """Log-odds from which ground counts as seen free."""
-ROUND_M = 0.7
-"""Ground must have been free this far round a reading, and half a beam's width more: neither is exact."""
+ROUND_M = 0.35
+"""Ground must have been free this far round a reading, and half a beam's width more: neither is exact.
+
+With more, what moves among posts is seen late; with less, walls seem to move.
+"""
 TOGETHER_M = 0.8
 """Readings nearer to each other than this are of one thing; it is found again this near to where it is expected."""
+GOES_ON_M = 0.5
+"""A thing goes on with the next reading if that lies this near, and half a beam's width more."""
+WIDEST_SINGLE_M = 0.3
+"""A single reading of a beam that is wider there may be of a wall that is seen at a flat angle."""
 WIDEST_M = 3.0
 """Anything wider is not a thing that moves but ground with an error of position."""
 WINDOW_S = 1.0
@@ -62,8 +71,8 @@ FINE_RAD = math.radians(2.0)
 PART_FREE = 0.3
 ALONE_M_S = 0.6
 """Below this speed a thing that stands alone is not believed to move."""
-MAX_YAW_RATE_RAD_S = math.radians(45.0)
-"""Faster than this, readings are too far from where they seem to be."""
+ALONE_MAX_YAW_RATE_RAD_S = math.radians(45.0)
+"""Of a rover that turns faster, readings are too far from where they seem to be to tell what only stands alone."""
 
 
 @njit(cache=True, nogil=True)
@@ -152,13 +161,14 @@ class ObjectTracker:
 
     def take(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
         """Look through a scan that has not been added to the map yet."""
-        if abs(yaw_rate_rad_s) > MAX_YAW_RATE_RAD_S or len(scan.bearing_rad) < LEAST_BEAMS:
+        if len(scan.bearing_rad) < LEAST_BEAMS:
             return
         ends, range_m = _ends(pose, scan)
         free = self._on_free_ground(ends, ROUND_M + 0.5 * scan.beam_width_rad * range_m)
         things: list[Sighting] = []
-        if free.any() or scan.beam_width_rad <= FINE_RAD:  # without either nothing of it may move
-            things = _seen_things(ends, free, _alone(scan), pose, scan.beam_width_rad)
+        fine = scan.beam_width_rad <= FINE_RAD and abs(yaw_rate_rad_s) <= ALONE_MAX_YAW_RATE_RAD_S
+        if free.any() or fine:  # without either nothing of it may move
+            things = _seen_things(ends, free, _alone(scan), pose, scan.beam_width_rad, fine=fine)
         if things or self._tracks:
             self._follow(pose.time_s, things)
 
@@ -275,13 +285,19 @@ def _alone(scan: RangeScan) -> tuple[NDArray[np.int64], dict[int, int]]:
 
 
 def _seen_things(
-    ends: Points, free: NDArray[np.bool_], alone: tuple[NDArray[np.int64], dict[int, int]], pose: Pose, beam_rad: float
+    ends: Points,
+    free: NDArray[np.bool_],
+    alone: tuple[NDArray[np.int64], dict[int, int]],
+    pose: Pose,
+    beam_rad: float,
+    *,
+    fine: bool,
 ) -> list[Sighting]:
-    """What may move: readings on free ground (``free``), things of which a part is, and with fine beams what is alone.
+    """What may move: readings on free ground (``free``), things of which a part is, and if ``fine`` what is alone.
 
     ``alone``: see ``_alone``.
     """
-    (thing, cut), fine = alone, beam_rad <= FINE_RAD
+    thing, cut = alone
     known, found = free.copy(), []
     for number in sorted(set(thing[thing >= 0].tolist())):
         own = thing == number
@@ -293,32 +309,63 @@ def _seen_things(
             known[own] = True
         elif fine and not free[own].any():
             found.append(_sighting(ends[own], pose, beam_rad, on_free_ground=False))
-    groups = _groups(ends[known], free[known])
-    found += [_sighting(seen, pose, beam_rad, on_free_ground=on_free) for seen, on_free in groups]
+    wholes = _wholes(ends, pose, beam_rad)
+    for rows, on_free in _groups(ends, known, free):
+        stands = on_free and _is_part_of_what_stands(rows, wholes, ends, free)
+        found.append(_sighting(ends[rows], pose, beam_rad, on_free_ground=on_free and not stands))
     return [one for one in found if _may_move(one)]
 
 
 def _may_move(thing: Sighting) -> bool:
-    """Whether it is as wide as things that move are: what only stands alone, or of which a part is out of sight, may
-    be the end of a wall.
+    """Whether it is as wide as things that move: what only stands alone, or of which a part is out of sight, may be the
+    end of a wall.
     """
     if thing.on_free_ground and not thing.cut:
-        return thing.seen_m <= WIDEST_M
+        is_flat = thing.seen_m == 0.0 and 2.0 * thing.blur_m > WIDEST_SINGLE_M
+        return thing.seen_m <= WIDEST_M and not is_flat
     least_m = 0.0 if thing.on_free_ground else ALONE_NARROWEST_M
     return least_m <= thing.seen_m <= ALONE_WIDEST_M
 
 
-def _groups(points: Points, free: NDArray[np.bool_]) -> list[tuple[Points, bool]]:
-    """Readings that lie together, and whether most of them are on free ground."""
+def _groups(ends: Points, known: NDArray[np.bool_], free: NDArray[np.bool_]) -> list[tuple[NDArray[np.int64], bool]]:
+    """Of the known readings those that lie together, by their rows, and whether most of them are on free ground."""
     groups: list[list[int]] = []
-    for i, point in enumerate(points):
+    for row in np.flatnonzero(known).tolist():
         for group in groups:
-            if min(math.dist(points[group[-1]], point), math.dist(points[group[0]], point)) <= TOGETHER_M:
-                group.append(i)
+            if min(math.dist(ends[group[-1]], ends[row]), math.dist(ends[group[0]], ends[row])) <= TOGETHER_M:
+                group.append(row)
                 break
         else:
-            groups.append([i])
-    return [(points[rows], 2 * int(free[rows].sum()) >= len(rows)) for rows in groups]
+            groups.append([row])
+    return [(np.array(rows), 2 * int(free[rows].sum()) >= len(rows)) for rows in groups]
+
+
+def _wholes(ends: Points, pose: Pose, beam_rad: float) -> NDArray[np.int64]:
+    """For each reading the number of the thing to which it belongs: from one reading to the next beside it it goes on
+    where they lie near each other.
+    """
+    away = ends - (pose.north_m, pose.east_m)
+    order = np.argsort(np.arctan2(away[:, 1], away[:, 0]), kind="stable")
+    ordered, range_m = ends[order], np.hypot(*away[order].T)
+    apart_m = np.hypot(*(ordered - np.roll(ordered, 1, axis=0)).T)
+    goes_on_m = GOES_ON_M + 0.5 * beam_rad * np.minimum(range_m, np.roll(range_m, 1))
+    begins = apart_m > goes_on_m
+    number = np.cumsum(begins)
+    wholes = np.empty(len(ends), np.int64)
+    wholes[order] = np.where(number == 0, number[-1:], number)  # the last goes on with the first
+    return wholes
+
+
+def _is_part_of_what_stands(
+    rows: NDArray[np.int64], wholes: NDArray[np.int64], ends: Points, free: NDArray[np.bool_]
+) -> bool:
+    """Whether readings on free ground belong to something larger that is too wide, or most of which is not on it."""
+    whole = np.isin(wholes, wholes[rows])
+    whole[rows] = True
+    if int(whole.sum()) == len(rows):
+        return False
+    wide_m = float(np.hypot(*np.ptp(ends[whole], axis=0)))
+    return wide_m > WIDEST_M or 2 * int(free[whole].sum()) < int(whole.sum())
 
 
 def _sighting(seen: Points, pose: Pose, beam_width_rad: float, *, on_free_ground: bool) -> Sighting:
