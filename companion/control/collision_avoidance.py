@@ -247,8 +247,8 @@ class CollisionAvoidance:
     def with_what_it_turned_off_for(self, moving: tuple[Moving, ...], now_s: float) -> tuple[Moving, ...]:
         """``moving``, and what the rover turned off for, where that is not among it any more.
 
-        Turned away the rover may not see it, and turned back it may stand in front of it: while it turns quickly it does
-        not see all that moves (`companion/perception/object_tracker.py`).
+        Turned away the rover may not see it, and turned back it may stand in front of it: while it turns quickly it
+        does not see all that moves (`companion/perception/object_tracker.py`).
         """
         for one in moving:
             if one.name in self._turned_off_for or self._turned_rad_s != 0.0:
