@@ -3,10 +3,10 @@
 Ground on which something stands was never seen free. So readings count that end on ground that had been seen free all
 round, unless they are a part of something of which most stands on other ground: a wall, a piece of which was taken for
 free ground because the position was not exact. So do those of a narrow thing that stands alone, with nothing near on
-either side; but what stands seems to move, too, when it is seen from another side, so such a thing must be faster, and
-it is not looked for while the rover turns quickly. Where the edge of the view cuts one off, its other side is followed.
-Readings that lie together are one thing, and a thing whose place changes evenly from scan to scan moves. The map does
-not use this: there a moving thing is evidence like any other, and is freed behind it.
+either side; but what stands seems to move, too, when it is seen from another side, so such a thing must be faster.
+Where the edge of the view cuts one off, its other side is followed. Readings that lie together are one thing, and a
+thing whose place changes evenly from scan to scan moves. The map does not use this: there a moving thing is evidence
+like any other, and is freed behind it.
 
 Nouns: object tracker.
 """
@@ -32,10 +32,11 @@ Points = NDArray[np.float64]
 
 FREE_AT = -0.5
 """Log-odds from which ground counts as seen free."""
-ROUND_M = 0.35
+ROUND_M, FINE_ROUND_M = 0.35, 0.5
 """Ground must have been free this far round a reading, and half a beam's width more: neither is exact.
 
-With more, what moves among posts is seen late; with less, walls seem to move.
+With more, what moves among posts is seen late; with less, walls seem to move. Fine beams free ground close beside legs
+and posts, too.
 """
 TOGETHER_M = 0.8
 """Readings nearer to each other than this are of one thing; it is found again this near to where it is expected."""
@@ -71,8 +72,8 @@ FINE_RAD = math.radians(2.0)
 PART_FREE = 0.3
 ALONE_M_S = 0.6
 """Below this speed a thing that stands alone is not believed to move."""
-ALONE_MAX_YAW_RATE_RAD_S = math.radians(45.0)
-"""Of a rover that turns faster, readings are too far from where they seem to be to tell what only stands alone."""
+FINE_MAX_YAW_RATE_RAD_S = math.radians(45.0)
+"""Of a rover that turns faster, readings of fine beams are too far from where they seem to be."""
 
 
 @njit(cache=True, nogil=True)
@@ -161,14 +162,15 @@ class ObjectTracker:
 
     def take(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
         """Look through a scan that has not been added to the map yet."""
-        if len(scan.bearing_rad) < LEAST_BEAMS:
+        fine = scan.beam_width_rad <= FINE_RAD
+        if len(scan.bearing_rad) < LEAST_BEAMS or (fine and abs(yaw_rate_rad_s) > FINE_MAX_YAW_RATE_RAD_S):
             return
         ends, range_m = _ends(pose, scan)
-        free = self._on_free_ground(ends, ROUND_M + 0.5 * scan.beam_width_rad * range_m)
+        round_m = FINE_ROUND_M if fine else ROUND_M
+        free = self._on_free_ground(ends, round_m + 0.5 * scan.beam_width_rad * range_m)
         things: list[Sighting] = []
-        fine = scan.beam_width_rad <= FINE_RAD and abs(yaw_rate_rad_s) <= ALONE_MAX_YAW_RATE_RAD_S
         if free.any() or fine:  # without either nothing of it may move
-            things = _seen_things(ends, free, _alone(scan), pose, scan.beam_width_rad, fine=fine)
+            things = _seen_things(ends, free, _alone(scan), pose, scan.beam_width_rad)
         if things or self._tracks:
             self._follow(pose.time_s, things)
 
@@ -285,19 +287,13 @@ def _alone(scan: RangeScan) -> tuple[NDArray[np.int64], dict[int, int]]:
 
 
 def _seen_things(
-    ends: Points,
-    free: NDArray[np.bool_],
-    alone: tuple[NDArray[np.int64], dict[int, int]],
-    pose: Pose,
-    beam_rad: float,
-    *,
-    fine: bool,
+    ends: Points, free: NDArray[np.bool_], alone: tuple[NDArray[np.int64], dict[int, int]], pose: Pose, beam_rad: float
 ) -> list[Sighting]:
-    """What may move: readings on free ground (``free``), things of which a part is, and if ``fine`` what is alone.
+    """What may move: readings on free ground (``free``), things of which a part is, and with fine beams what is alone.
 
     ``alone``: see ``_alone``.
     """
-    thing, cut = alone
+    (thing, cut), fine = alone, beam_rad <= FINE_RAD
     known, found = free.copy(), []
     for number in sorted(set(thing[thing >= 0].tolist())):
         own = thing == number

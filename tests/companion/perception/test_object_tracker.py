@@ -16,6 +16,7 @@ from companion.settings import Settings
 from sitl.sensors.range_sensors import SUITES
 from sitl.world.movers import Mover, timed_track
 from sitl.world.world import World
+from tests.support.shared_data import SHARED, needs_shared
 
 SETTINGS = Settings()
 PERIOD_S = 0.1
@@ -202,6 +203,34 @@ def test_walls_seldom_seem_to_move_when_the_place_wanders() -> None:
         watcher = Watcher(World(obstacles, 0.2), "lidar-360", seed, 1.5, 0.4, 0.3, 0.4)
         found.append(sum(bool(watcher.look()) for _ in range(100)))
     assert sum(found) <= 24, found
+
+
+@needs_shared
+def test_a_real_rover_among_legs_of_tables_seldom_sees_something_move() -> None:
+    """A Hokuyo on the MinesRover through rooms, by its wheels alone: in at most an eighth of 640 scans."""
+    lines = (SHARED / "data/lidar/breezyslam/exp2.dat").read_text(encoding="utf-8").splitlines()
+    evidence = new_map(empty_grid(60, 60), 0.35, SETTINGS.mapping)
+    tracker, bearings = ObjectTracker(evidence), -np.radians(np.linspace(-120.0, 120.0, 682)[::3])
+    pose, before, moves = Pose(30.0, 30.0, 0.0, 0.0), None, 0
+    for scans, line in enumerate(filter(str.strip, lines), 1):
+        row = np.array(line.split(), float)
+        yaw_rate_rad_s = 0.0
+        if before is not None:
+            elapsed_s = (row[0] - before[0]) / 1e6
+            left_m, right_m = 2.0 * math.pi * 0.077 * (row[2:4] - before[2:4]) / 2000.0
+            yaw_rate_rad_s = (left_m - right_m) / 0.33 / elapsed_s
+            there = pose.point.moved(pose.heading_rad, (left_m + right_m) / 2.0)
+            heading_rad = pose.heading_rad + yaw_rate_rad_s * elapsed_s
+            pose = Pose(there.north_m, there.east_m, heading_rad, row[0] / 1e6)
+        before, range_m = row, row[24:706:3] / 1000.0
+        valid, range_m = range_m > 0.05, np.where(range_m < 4.0, range_m, np.inf)
+        scan = RangeScan(pose.time_s, bearings[valid], range_m[valid], 0.05, 4.0, math.radians(240.0 / 227), "real")
+        tracker.take(pose, yaw_rate_rad_s, scan)
+        integrate(evidence, pose, scan, scans)
+        tracker.remember(pose, scan.max_range_m)
+        moves += bool(tracker.moving(pose.time_s, SETTINGS.traffic))
+    assert 600 < scans < 660
+    assert moves <= 80
 
 
 def test_what_moves_among_posts_is_seen() -> None:
