@@ -255,6 +255,88 @@ def test_what_moves_is_seen_while_the_rover_turns_quickly() -> None:
         assert sum(seen[20:110]) >= 75
 
 
+def found_in(ranges_m: list[np.ndarray], free: np.ndarray, yaw_rate_rad_s: float = 0.0, seed: int = 0) -> list[Moving]:
+    """What has moved in such scans of a full circle, from straight ahead on, 0.1 s apart, after others that saw
+    bearings ``free`` up to 8 m and nothing of the rest. With a ``seed`` their readings come in no order.
+    """
+    beams = len(free)
+    evidence = new_map(empty_grid(40, 40), 0.35, SETTINGS.mapping)
+    tracker, order = ObjectTracker(evidence), np.arange(beams)
+    if seed:
+        order = np.random.default_rng(seed).permutation(beams)
+    bearing_rad, width_rad = np.radians(order * 360.0 / beams), math.radians(360.0 / beams)
+    before = [np.where(free, np.inf, np.nan)] * 5
+    for scans, range_m in enumerate([*before, *ranges_m], 1):
+        pose = Pose(20.0, 20.0, 0.0, scans * PERIOD_S)
+        scan = RangeScan(pose.time_s, bearing_rad, range_m[order], 0.1, 8.0, width_rad, "test")
+        tracker.take(pose, yaw_rate_rad_s, scan)
+        if scans <= len(before):
+            integrate(evidence, pose, scan, scans)
+            tracker.remember(pose, 8.0)
+    return list(tracker.moving(pose.time_s, SETTINGS.traffic))
+
+
+def wall_behind(away_m: float, right_m: float, left_m: float) -> np.ndarray:
+    """Ranges of 72 beams to a wall straight behind, so far to either side."""
+    beside_rad = np.radians(np.arange(72) * 5.0 - 180.0)
+    to_the_left_m = away_m * np.tan(beside_rad)
+    met = (np.abs(beside_rad) < 1.5) & (-right_m <= to_the_left_m) & (to_the_left_m <= left_m)
+    return np.where(met, away_m / np.cos(beside_rad), np.inf)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize(("away_m", "right_m", "left_m"), [(2.5, 1.8, 3.4), (6.8, 2.9, 4.5), (2.5, 2.6, 1.4)])
+def test_a_piece_of_a_wall_on_free_ground_does_not_move(
+    away_m: float, right_m: float, left_m: float, seed: int
+) -> None:
+    """Its right part seems to come nearer, on ground that was free. Alone it moves; as a piece of a wall of which most
+    stands on other ground, or that is too wide, it does not.
+    """
+    free = (np.arange(72) >= 15) & (np.arange(72) <= 36)
+    assert found_in([wall_behind(away_m - 0.05 * k, right_m, -0.1) for k in range(10)], free, seed=seed)
+    assert not found_in([wall_behind(away_m - 0.05 * k, right_m, left_m) for k in range(10)], free, seed=seed)
+
+
+@pytest.mark.parametrize(("nearest_m", "moves"), [(1.4, True), (4.5, False)])
+def test_a_single_reading_of_a_wide_beam_does_not_move(nearest_m: float, moves: bool) -> None:
+    """A wall at a flat angle, its readings 0.9 m apart: of beams that are at most 0.28, or at least 0.33 m wide."""
+    scans = []
+    for k in range(10):
+        range_m = np.full(72, np.inf)
+        range_m[9], range_m[10:13] = np.nan, nearest_m + 0.9 * np.arange(3) - 0.08 * k
+        scans.append(range_m)
+    assert bool(found_in(scans, np.ones(72, np.bool_))) is moves
+
+
+@pytest.mark.parametrize(
+    ("beams", "yaw_rate_deg_s", "moves"), [(180, 0.0, True), (180, 44.0, True), (180, 46.0, False), (171, 0.0, False)]
+)
+def test_beams_of_two_degrees_see_what_moves_on_ground_never_seen(
+    beams: int, yaw_rate_deg_s: float, moves: bool
+) -> None:
+    scans = []
+    for k in range(10):
+        range_m = np.full(beams, np.inf)
+        range_m[20 : 20 + 7] = 3.0 - 0.1 * k
+        scans.append(range_m)
+    assert bool(found_in(scans, np.zeros(beams, np.bool_), math.radians(yaw_rate_deg_s))) is moves
+
+
+@pytest.mark.parametrize(
+    ("suite", "radius_m", "speed_m_s", "least"), [("lidar-360", 0.25, 1.0, 45), ("lidar-90", 0.4, 0.45, 25)]
+)
+def test_what_moves_along_a_wall_is_seen(suite: str, radius_m: float, speed_m_s: float, least: int) -> None:
+    """With 0.3 m of room between the two."""
+    north_m = 15.0 - 0.3 - radius_m
+    for seed in range(3):
+        obstacles = np.zeros((40, 40), np.bool_)
+        obstacles[15] = True
+        track = timed_track([(north_m, 23.8), (north_m, 16.2)], speed_m_s, 2.0, repeats=False)
+        watcher = Watcher(World(obstacles, movers=(Mover("m", radius_m, track),)), suite, seed)
+        seen = [any(abs(one.east_m_s + speed_m_s) < 0.3 for one in watcher.look()) for _ in range(130)]
+        assert sum(seen) >= least
+
+
 def test_four_scans_are_enough_also_where_they_do_not_come_exactly_in_time() -> None:
     seen = tuple(Sighting(time_s, 5.0 + time_s, 3.0, 0.4, 0.0, 0.5, True) for time_s in (0.0, 0.1, 0.2, 0.2999))
     assert Track(1, seen[:3]).estimate is None
