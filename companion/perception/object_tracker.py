@@ -1,9 +1,9 @@
 """Object tracker: which of the things that the range sensors see are moving, and where to.
 
 Ground on which something stands was never seen free. So readings count that end on ground that had been seen free all
-round, unless they are a part of something of which most stands on other ground: a wall, a piece of which was taken for
-free ground because the position was not exact. So do those of a narrow thing that stands alone, with nothing near on
-either side; but what stands seems to move, too, when it is seen from another side, so such a thing must be faster.
+round. So do those of a narrow thing that stands alone, with nothing near on either side; but what stands seems to move,
+too, when it is seen from another side, so such a thing must be faster. So must a piece, on free ground, of something
+larger that mostly is not: a wall, a piece of which was taken for free ground because the position was not exact.
 Where the edge of the view cuts one off, its other side is followed. Readings that lie together are one thing, and a
 thing whose place changes evenly from scan to scan moves. The map does not use this: there a moving thing is evidence
 like any other, and is freed behind it.
@@ -43,7 +43,8 @@ TOGETHER_M = 0.8
 GOES_ON_M = 0.5
 """A thing goes on with the next reading if that lies this near, and half a beam's width more."""
 WIDEST_SINGLE_M = 0.3
-"""A single reading of a beam that is wider there may be of a wall that is seen at a flat angle."""
+"""A single reading of a beam that is wider there may be of a wall that is seen at a flat angle, if it does not stand
+alone."""
 WIDEST_M = 3.0
 """Anything wider is not a thing that moves but ground with an error of position."""
 WINDOW_S = 1.0
@@ -307,7 +308,9 @@ def _seen_things(
             found.append(_sighting(ends[own], pose, beam_rad, on_free_ground=False))
     wholes = _wholes(ends, pose, beam_rad)
     for rows, on_free in _groups(ends, known, free):
-        stands = on_free and _is_part_of_what_stands(rows, wholes, ends, free)
+        if len(rows) == 1 and thing[rows[0]] < 0 and _is_wide(ends[rows[0]], pose, beam_rad):
+            continue
+        stands = on_free and _is_part_of_what_stands(rows, wholes, free)
         found.append(_sighting(ends[rows], pose, beam_rad, on_free_ground=on_free and not stands))
     return [one for one in found if _may_move(one)]
 
@@ -317,8 +320,7 @@ def _may_move(thing: Sighting) -> bool:
     end of a wall.
     """
     if thing.on_free_ground and not thing.cut:
-        is_flat = thing.seen_m == 0.0 and 2.0 * thing.blur_m > WIDEST_SINGLE_M
-        return thing.seen_m <= WIDEST_M and not is_flat
+        return thing.seen_m <= WIDEST_M
     least_m = 0.0 if thing.on_free_ground else ALONE_NARROWEST_M
     return least_m <= thing.seen_m <= ALONE_WIDEST_M
 
@@ -352,16 +354,15 @@ def _wholes(ends: Points, pose: Pose, beam_rad: float) -> NDArray[np.int64]:
     return wholes
 
 
-def _is_part_of_what_stands(
-    rows: NDArray[np.int64], wholes: NDArray[np.int64], ends: Points, free: NDArray[np.bool_]
-) -> bool:
-    """Whether readings on free ground belong to something larger that is too wide, or most of which is not on it."""
+def _is_part_of_what_stands(rows: NDArray[np.int64], wholes: NDArray[np.int64], free: NDArray[np.bool_]) -> bool:
+    """Whether readings on free ground belong to something larger, most of which is not on it."""
     whole = np.isin(wholes, wholes[rows])
-    whole[rows] = True
-    if int(whole.sum()) == len(rows):
-        return False
-    wide_m = float(np.hypot(*np.ptp(ends[whole], axis=0)))
-    return wide_m > WIDEST_M or 2 * int(free[whole].sum()) < int(whole.sum())
+    return 2 * int(free[whole].sum()) < int(whole.sum())
+
+
+def _is_wide(end: Points, pose: Pose, beam_rad: float) -> bool:
+    """Whether a beam is wide where it ended."""
+    return beam_rad * math.dist(end, (pose.north_m, pose.east_m)) > WIDEST_SINGLE_M
 
 
 def _sighting(seen: Points, pose: Pose, beam_width_rad: float, *, on_free_ground: bool) -> Sighting:
