@@ -15,7 +15,6 @@ from companion.core.footprint import Footprint
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.evidence_map import EvidenceMap
-from companion.perception.moving_obstacles import Moving
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedPosition, Setpoint
 
@@ -37,7 +36,7 @@ class LocalView:
     ``drag``. ``rolls_back``: it moves tail first.
     ``following``: how it follows velocities, as far as is known; over a late link it may obey after ``soonest_s``, too.
     ``body``: its outline, if it is no circle.
-    ``scans``: so many have been taken into the map. ``moving``: what moves round the rover.
+    ``scans``: so many have been taken into the map.
     """
 
     pose: Pose
@@ -57,7 +56,6 @@ class LocalView:
     soonest_s: float = math.inf
     body: Footprint | None = None
     scans: int = 0
-    moving: tuple[Moving, ...] = ()
 
     @property
     def footprint(self) -> Footprint:

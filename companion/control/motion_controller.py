@@ -23,7 +23,6 @@ from companion.control.last_command_kernels import admitted_speeds, braking_spar
 from companion.control.local_view import LocalView
 from companion.control.motion_ground import NEAR_M, Window, look_round, unseen_to_m
 from companion.control.motion_kernels import (
-    NOTHING_MOVES,
     Body,
     MotionProblem,
     RoverModel,
@@ -56,8 +55,6 @@ WEIGHTS = Weights(
     change=0.1,
     late=0.4,
     in_line=2.0,
-    apart_m=0.3,
-    meets=20.0,
 )
 SHARES = (1.0, 0.7, 0.4, 0.15)
 """Of the speed that was planned, tried in turn until the rover may be left alone with it."""
@@ -232,9 +229,8 @@ class MotionController:
         start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
         pending = _pending(view, round(model.dead_s / STEP_S), STEP_S)
         return MotionProblem(
-            start, pending, self._window.ground, self._body, model, WEIGHTS, NONE_ADMITTED, HORIZON_S, STEP_S,
-            _moving(view, self._window, model),
-        )  # fmt: skip
+            start, pending, self._window.ground, self._body, model, WEIGHTS, NONE_ADMITTED, HORIZON_S, STEP_S
+        )
 
     def _safe(self, wanted: NDArray[np.float64], view: LocalView, worst: Problems) -> ToldVelocity:
         """This command, or a slower one, or the best way to brake."""
@@ -267,17 +263,6 @@ class MotionController:
         best = float(BRAKE_TURNS[np.argmax(np.minimum(spares_m, ENOUGH_M) - np.where(doubtful, worse_m, 0.0))])
         rolls = abs(worst[0].start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
-
-
-def _moving(view: LocalView, window: Window, model: RoverModel) -> NDArray[np.float64]:
-    """See ``MotionProblem.moving``: what the rover can meet within the horizon."""
-    lasts_s, rows = HORIZON_S + model.dead_s, []
-    for one in view.moving:
-        here = one.at(view.pose.time_s)
-        reach_m = (one.speed_m_s + model.fastest_m_s) * lasts_s + one.radius_m + view.footprint.radius_m
-        if here.distance_m(view.pose.point) <= reach_m + WEIGHTS.apart_m:
-            rows.append((*window.place(here), one.east_m_s, one.north_m_s, one.radius_m))
-    return np.array(rows) if rows else NOTHING_MOVES
 
 
 def _at_moments(way: Points, times_s: Points) -> Points:

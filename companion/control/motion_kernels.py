@@ -2,9 +2,8 @@
 
 A motion is ``knots``, shape (n, 2): forward speed (m/s) and turn rate (rad/s, clockwise), told at equal times over the
 horizon, with straight lines between them. Its cost is in seconds: how long it takes, what is then left to go, and what
-is added for ground that is narrow or unseen, for what moves and comes near, and for the time to turn and to gather
-speed at its end. Places are x (east) and y (north) in metres from the corner of a ``MotionGround``; headings clockwise
-from north.
+is added for ground that is narrow or unseen, and for the time to turn and to gather speed at its end. Places are x
+(east) and y (north) in metres from the corner of a ``MotionGround``; headings clockwise from north.
 
 Nouns: motion, motion ground, rover model.
 """
@@ -43,9 +42,6 @@ BETWEEN_CELLS = 1.5
 AWAY = 0.1
 """One whose outline lies over something must get out of it by so much for each metre it goes: it may leave, but not
 touch the next thing as deep."""
-
-
-NOTHING_MOVES = np.zeros((0, 5))
 
 
 class MotionGround(NamedTuple):
@@ -97,8 +93,7 @@ class Weights(NamedTuple):
     last one by 1 m/s or 1 rad/s. ``late``: seconds for each second on the way and each second that is left from there:
     of two motions with the same end the one that is near it sooner costs less. Else the rover would put off what it
     could do now, and again the next time. ``in_line``: seconds for each second that the front of a long rover is later
-    on its way at the end than if it pointed along it. ``apart_m``: kept from what moves; ``meets``: seconds a second
-    where the two touch, more the deeper.
+    on its way at the end than if it pointed along it.
     """
 
     margin_m: float
@@ -111,8 +106,6 @@ class Weights(NamedTuple):
     change: float
     late: float
     in_line: float
-    apart_m: float
-    meets: float
 
 
 class Start(NamedTuple):
@@ -131,7 +124,6 @@ class MotionProblem(NamedTuple):
     ``pending``: shape (n, 2), the commands told that have not had their effect yet, one a step.
     ``admitted_m_s``: shape (n, 2), the fastest speeds that may be told, forwards and backwards, at n turn rates evenly
     from the fastest to the left to the fastest to the right.
-    ``moving``: shape (n, 5), what moves: place now, velocity to the east and to the north, radius. It goes on evenly.
     """
 
     start: Start
@@ -143,7 +135,6 @@ class MotionProblem(NamedTuple):
     admitted_m_s: Any
     horizon_s: float
     step_s: float
-    moving: Any
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -267,7 +258,6 @@ def cost_s(knots, problem):
     between_m = BETWEEN_CELLS * cell_m
     matters_m = max(weights.near_m, weights.margin_m + weights.margin_s * _fastest_m_s(knots, start, model)) + between_m
     sure_m = sure_seen_m = 0.0
-    moving, apart_m = problem.moving, weights.apart_m
     for step in range(steps):
         told_m_s, told_rad_s = _told_in(step, knots, pending, step_share)
         before_rad = state[2]
@@ -293,10 +283,6 @@ def cost_s(knots, problem):
             sure_seen_m = clear_seen_m - between_m
             if clear_seen_m < 0.0:
                 extra += weights.unseen * step_s
-        if moving.shape[0] > 0:
-            room = room_to_moving_m(moving, (step + 1) * step_s, body, x, y, heading)
-            if room < apart_m:
-                extra += weights.meets * (1.0 - room / apart_m) * step_s
         left = left_s(togo_s, togo_cell_m, x, y)
         extra += weights.late * min(left, first_s + 1.0) * step_s
         if ends:
@@ -305,20 +291,6 @@ def cost_s(knots, problem):
         if left < ARRIVED_S:
             return step * step_s + extra
     return steps * step_s + extra + _after_s(state, still_allowed_m(least, start, state), problem)
-
-
-@njit(cache=True, nogil=True)
-def room_to_moving_m(moving, time_s, body, x_m, y_m, heading_rad):
-    """Metres between the rover's outline and the nearest of what moves, at a moment from now; below 0 they touch."""
-    sine, cosine = math.sin(heading_rad), math.cos(heading_rad)
-    nearest = FAR_M
-    for row in range(moving.shape[0]):
-        to_x = moving[row, 0] + moving[row, 2] * time_s - x_m
-        to_y = moving[row, 1] + moving[row, 3] * time_s - y_m
-        for disc in range(body.ahead_m.size):
-            ahead_m = body.ahead_m[disc]
-            nearest = min(nearest, math.hypot(to_x - ahead_m * sine, to_y - ahead_m * cosine) - moving[row, 4])
-    return nearest - body.radius_m
 
 
 @njit(cache=True, nogil=True)

@@ -18,7 +18,6 @@ from companion.control.motion_planners import motion_planner
 from companion.control.point_controller import PointController
 from companion.control.reference_path import ReferencePath, advanced, narrowest_ahead, reference_path, rejoined
 from companion.control.stuck_recovery import StuckRecovery
-from companion.core.changed import changed
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
 from companion.core.grid import Cell
@@ -195,8 +194,8 @@ class GoalDriver:
 
     def guide(self, view: LocalView, moving: tuple[Moving, ...] = ()) -> ControlCommand:
         """The command for this tick: along the path, and out of the way of what moves."""
+        self.makes_way, command = False, self._follow(view)
         moving = self._avoidance.with_what_it_turned_off_for(moving, view.pose.time_s)
-        self.makes_way, command = False, self._follow(changed(view, moving=moving) if moving else view)
         if not moving or (self.decision is not None and self.decision.action is Action.REACHED):
             return command
         command, yields = self._avoided(command, view, moving)

@@ -21,7 +21,7 @@ from companion.control.motion_controller import (
     rover_model,
 )
 from companion.control.motion_ground import AROUND_M, Window, look_round
-from companion.control.motion_kernels import MotionProblem, clearance_m, moved, room_to_moving_m
+from companion.control.motion_kernels import MotionProblem, clearance_m, moved
 from companion.control.motion_planners import Found, motion_planner
 from companion.control.motion_prediction import braked_m
 from companion.control.position_ahead import PositionAhead
@@ -33,7 +33,6 @@ from companion.core.frames import NedPoint, Pose
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.distance_field import distance_field
 from companion.mapping.evidence_map import EvidenceMap
-from companion.perception.moving_obstacles import Moving
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity, Setpoint
 from tests.companion.control.test_motion_ground import PATH, ground, wall
@@ -103,34 +102,6 @@ def posts(seed: int) -> EvidenceMap:
         y, x = int(north_m / evidence.evidence_m), int(east_m / evidence.evidence_m)
         evidence.log_odds[y : y + 2, x : x + 2] = 3.0
     return evidence
-
-
-def crossed(walker: Moving, seed: int, known: tuple[Moving, ...]) -> float:
-    """Drives 6 s over open ground, which a walker crosses: the least room between the two. ``known``: what it sees."""
-    leads, evidence, path = controller(seed), ground(), PATH
-    state, told, lately = (10.0, 3.0, 0.0, 0.0, 0.0), [(0.0, 0.0)] * 6, Told()
-    rooms_m = []
-    for now_s in np.arange(0.0, 6.0, TICK_S).tolist():
-        x, y, heading, speed, turn = state
-        at = view(evidence, Pose(y, x, heading, now_s), abs(speed))
-        at = replace(at, yaw_rate_rad_s=turn, lately=lately, rolls_back=speed < 0.0, moving=known)
-        path = advanced(path, at.pose)
-        setpoint = leads.follow(path, at).setpoint
-        told.append(_as_velocity(setpoint, at.pose))
-        lately = after(lately, setpoint, now_s)
-        state = moved(state, *told[-6], rover_model(at), TICK_S)
-        there = walker.at(now_s + TICK_S)
-        row = np.array([(there.east_m, there.north_m, 0.0, 0.0, walker.radius_m)])
-        rooms_m.append(room_to_moving_m(row, 0.0, leads._body, state[0], state[1], state[2]))
-    return min(rooms_m)
-
-
-def test_motions_keep_apart_from_what_moves() -> None:
-    """A walker who would be met after 4 s: it waits, or passes behind."""
-    walker = Moving("seen 1", 0.0, NedPoint(9.0, 6.0), 0.0, 1.0, 0.4)
-    assert min(crossed(walker, seed, ()) for seed in range(2)) < 0.0
-    rooms_m = [crossed(walker, seed, (walker,)) for seed in range(6)]
-    assert min(rooms_m) > 0.15, rooms_m
 
 
 @pytest.mark.parametrize("gain", [pytest.param(0.7, marks=pytest.mark.thorough), 1.3])

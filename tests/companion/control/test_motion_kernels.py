@@ -12,7 +12,6 @@ from companion.control.motion_controller import WEIGHTS as DRIVEN_WITH
 from companion.control.motion_kernels import (
     AS_AT_EDGE,
     BLOCKED_S,
-    NOTHING_MOVES,
     Body,
     MotionGround,
     MotionProblem,
@@ -26,7 +25,6 @@ from companion.control.motion_kernels import (
     keep_within,
     moved,
     next_generation,
-    room_to_moving_m,
     told_at,
 )
 from companion.mapping.cost_to_go import cost_to_go
@@ -38,7 +36,7 @@ MODEL = RoverModel(0.2, 1.0, 1.0, 2.0, 2.0, 0.5, 1.5, 1.0)
 BODY = Body(np.array([-0.1, 0.1]), 0.25, 0.35)
 ALL_ADMITTED = np.tile((2.0, 0.5), (3, 1))
 STANDING = Start(5.0, 2.0, 0.0, 0.0, 0.0)
-WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0, 0.0, 2.0, 0.3, 20.0)
+WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0, 0.0, 2.0)
 
 
 def problem(
@@ -54,7 +52,7 @@ def problem(
     seen_m = distance_field(blocked | unseen) * np.float32(CELL_M) - np.float32(0.5 * CELL_M)
     pace = np.where(gap_m > BODY.radius_m, CELL_M / MODEL.fastest_m_s, np.inf)
     ground = MotionGround(gap_m, seen_m, CELL_M, cost_to_go(pace, np.array([[50, 85]])), CELL_M, ends)
-    return MotionProblem(start, np.zeros((2, 2)), ground, BODY, MODEL, WEIGHTS, ALL_ADMITTED, 2.5, 0.1, NOTHING_MOVES)
+    return MotionProblem(start, np.zeros((2, 2)), ground, BODY, MODEL, WEIGHTS, ALL_ADMITTED, 2.5, 0.1)
 
 
 def constant(speed_m_s: float, turn_rad_s: float = 0.0) -> np.ndarray:
@@ -194,37 +192,3 @@ def test_a_wall_nearby_is_a_risk_with_the_weights_that_are_driven_with() -> None
         return cost_s(constant(1.0), with_it) - cost_s(constant(1.0), without)
 
     assert risk_s((25, 45, 55, 57)) > 0.1 and risk_s((25, 45, 60, 62)) == 0.0
-
-
-def with_moving(*rows: tuple[float, float, float, float, float], start: Start = STANDING) -> MotionProblem:
-    """Open ground; each row: x, y, velocity east and north, radius."""
-    return problem(start=start)._replace(moving=np.array(rows))
-
-
-def test_a_motion_that_meets_what_moves_costs_more_than_one_that_waits_or_passes_behind() -> None:
-    rolling = Start(5.0, 2.0, 0.0, 1.0, 0.0)
-    crosses = with_moving((3.2, 4.5, 1.0, 0.0, 0.4), start=rolling)  # before the rover's front after 1.8 s
-    free = problem(start=rolling)
-    on, slow = constant(1.5), constant(0.3)
-    assert cost_s(on, free) < cost_s(slow, free)
-    assert cost_s(on, crosses) > cost_s(on, free) + 5.0
-    assert cost_s(slow, crosses) == pytest.approx(cost_s(slow, free))
-    passed = with_moving((6.5, 4.5, 1.0, 0.0, 0.4), start=rolling)
-    assert cost_s(on, passed) == pytest.approx(cost_s(on, free))
-
-
-def test_room_to_what_moves_counts_from_the_outline_at_that_moment() -> None:
-    moving = np.array([(5.0, 6.0, 0.0, -1.0, 0.5), (8.0, 2.0, 0.0, 0.0, 0.5)])
-    # Discs 0.1 m ahead and behind, of 0.25 m.
-    assert room_to_moving_m(moving, 0.0, BODY, 5.0, 2.0, 0.0) == pytest.approx(3.0 - 0.5 - 0.25 - (3.0 - 9.01**0.5))
-    assert room_to_moving_m(moving, 2.0, BODY, 5.0, 2.0, 0.0) == pytest.approx(2.0 - 0.1 - 0.5 - 0.25)
-    assert room_to_moving_m(moving, 2.0, BODY, 5.0, 2.0, math.pi / 2.0) == pytest.approx(4.01**0.5 - 0.75)
-    assert room_to_moving_m(moving, 4.0, BODY, 5.0, 2.0, 0.0) < 0.0
-
-
-def test_nearer_to_what_moves_costs_more() -> None:
-    """It comes along beside a rover that stands."""
-    rooms_m = (0.05, 0.15, 0.25, 0.35)
-    costs = [cost_s(constant(0.0), with_moving((5.0 + 0.25 + 0.4 + room, 2.0, 0.0, 0.0, 0.4))) for room in rooms_m]
-    assert costs[0] > costs[1] > costs[2] > costs[3]
-    assert costs[3] == pytest.approx(cost_s(constant(0.0), problem()))

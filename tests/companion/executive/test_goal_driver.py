@@ -10,7 +10,6 @@ from companion.control.controller import ControlCommand, Purpose
 from companion.control.local_view import LocalView
 from companion.control.motion_prediction import Points, braked_m, moved_on_arc
 from companion.control.point_controller import PointController
-from companion.control.reference_path import ReferencePath
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -204,26 +203,6 @@ def test_what_comes_into_view_later_is_made_way_for_anew(monkeypatch: pytest.Mon
         assert (told.purpose, one.driver.makes_way) == (Purpose.BRAKE, True)
         one.driver.guide(one.at(begins_s + 0.1, 1.5))
     assert len(paused) == 2
-
-
-class Watches(PointController):
-    """Notes what it is told to move."""
-
-    seen: tuple[Moving, ...] = ()
-
-    def follow(self, path: ReferencePath, view: LocalView) -> ControlCommand:
-        self.seen = view.moving
-        return super().follow(path, view)
-
-
-def test_the_controller_knows_what_moves() -> None:
-    walker, watches = Moving("seen 1", 0.1, NedPoint(23.4, 22.6), 0.0, -0.9, 0.5), Watches()
-    one = Drive(InlineRunner(), watches)
-    one.head_for(target(32.5, 20.5))
-    one.update(0.0, 1.5)
-    assert watches.seen == ()
-    one.driver.guide(one.at(0.1, 1.5), (walker,))
-    assert watches.seen == (walker,)
 
 
 class TurnsOff(PointController):
