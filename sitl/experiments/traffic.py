@@ -170,7 +170,8 @@ The ways, all of which yield: the rover stops or moves aside before what comes a
 - *{Way.ONE_SPEED}*: `vertex++` plans paths past where things will be, at cruise speed.
 - *{Way.SPEEDS}*: `vertex++` with a speed for each piece of the path.
 - *{Way.HYBRID}*: the planner that the program has without settings, which knows nothing of motion either.
-- *{Way.MOTIONS}*: `motion-ga` plans motions among them, the planner is `hybrid`, with the guard on the autopilot.
+- *{Way.MOTIONS}*: `motion-ga` plans motions that know nothing of what moves; the planner is `hybrid`, with the guard
+  on the autopilot.
 
 *contacts*: while the rover moved; *touched in*: the share of the runs with such a contact; *run into*: it stood, and
 something came along; *refused*: setpoints that the last look replaced; *missed*: targets not reached; *mean s*: driving
