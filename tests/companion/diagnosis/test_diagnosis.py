@@ -100,6 +100,7 @@ CASES: list[tuple[str, Level, Survey]] = [
     ("guard", W, replace(with_set(SCR_ENABLE=0.0), vehicle=replace(WELL.vehicle, guard=None))),
     ("guard", W, with_state(guard=None)),
     ("late-guard", N, with_state(guard=GuardSeen(0.0, 1.0, False))),
+    ("guard-wait", N, with_set(SCR_USER1=100.0)),
     ("port-shared", S, replace(WELL, rivals=("cat (process 7)",), bad_bytes=900, read_bytes=1000)),
     ("port-damaged", W, replace(WELL, bad_bytes=60, read_bytes=1000)),
     ("points-frame", W, replace(WELL, sources=(replace(CAMERA, frame=1, blind=True),))),
