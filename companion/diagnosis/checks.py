@@ -40,9 +40,9 @@ STICKS = {"RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0}
 STATIONS = ("MAV_GCS_SYSID", "SYSID_MYGCS")
 """The same parameter in 4.7 and in older versions."""
 SCRIPTS = ("SCR_ENABLE", "SCR_USER1")
+"""A board that runs no scripts does not have them."""
 GUARD_LEAST_MS = 200.0
 """See companion/vehicle/guard.lua."""
-"""A board that runs no scripts does not have them."""
 FAILSAFES = {"FS_ACTION": "A failsafe", "FS_EKF_ACTION": "A lost position"}
 PARAMETERS = (
     "OA_TYPE",
@@ -409,12 +409,9 @@ def guarded(seen: Survey) -> Iterator[Finding]:
         says = f"The guard on the autopilot waits {guard.waits_s:g} s"
         says += f": with more than {IN_TIME_S:g} s planned motions keep more room, as without one."
         yield Finding("late-guard", Level.NOTE, says, "set SCR_USER1 to 300, on a slow computer to 900 at most")
-    elif 0.0 < seen.parameters.get("SCR_USER1", 0.0) < GUARD_LEAST_MS:
-        says = (
-            f"SCR_USER1 is {seen.parameters['SCR_USER1']:g}, but the guard waits {guard.waits_s:g} s: it takes no less "
-        )
-        says += f"than {GUARD_LEAST_MS:g} (milliseconds)."
-        yield to_set("guard-wait", Level.NOTE, says, "SCR_USER1", seen.parameters["SCR_USER1"], 300.0)
+    elif 0.0 < (given_ms := seen.parameters.get("SCR_USER1", 0.0)) < GUARD_LEAST_MS:
+        says = f"SCR_USER1 is {given_ms:g} ms, but the guard waits {GUARD_LEAST_MS:g} ms: it takes no less."
+        yield to_set("guard-wait", Level.NOTE, says, "SCR_USER1", given_ms, 300.0)
 
 
 def sticks(seen: Survey) -> Iterator[Finding]:
