@@ -17,7 +17,6 @@ from companion.control.motion_kernels import (
     AS_AT_EDGE,
     BETWEEN_CELLS,
     FAR_M,
-    ROOMY_M,
     at_place,
     discs_clear_m,
     least_allowed_m,
@@ -65,11 +64,16 @@ def _turnings(told_rad_s, held, gains, fastest_m_s, problem):
                 now_rad_s = pending[step, 1]
             elif step < early + held:
                 now_rad_s = told_rad_s
-            before = heading
+            before, turned_before = heading, turn
             middle, heading, turn = turned(heading, turn, factor * now_rad_s, model, step_s)
-            rows[at, step, 0], rows[at, step, 1] = math.sin(middle), math.cos(middle)
-            rows[at, step, 2], rows[at, step, 3] = math.sin(heading), math.cos(heading)
-            rows[at, step, 4], rows[at, step, 5] = abs(heading - before), abs(turn)
+            row = rows[at, step]
+            if step > 0 and turned_before == 0.0 and turn == 0.0:  # as the step before: no sine is needed
+                row[0] = row[2] = rows[at, step - 1, 2]
+                row[1] = row[3] = rows[at, step - 1, 3]
+            else:
+                row[0], row[1] = math.sin(middle), math.cos(middle)
+                row[2], row[3] = math.sin(heading), math.cos(heading)
+            row[4], row[5] = abs(heading - before), abs(turn)
     return rows
 
 
@@ -87,12 +91,14 @@ def _spare_m(told_m_s, held, turning, margin_m, margin_s, problem, least_m, most
     gap_m, seen_m, cell_m = ground.gap_m, ground.seen_m, ground.cell_m
     x, y, speed, turn = start.x_m, start.y_m, start.speed_m_s, start.turn_rad_s
     early, side_m = pending.shape[0], body.around_m - body.radius_m
-    still = least_allowed_m(gap_m, cell_m, body, start)
-    still_seen = least_allowed_m(seen_m, cell_m, body, start, 0.0)
+    sine, cosine = math.sin(start.heading_rad), math.cos(start.heading_rad)
+    still = least_allowed_m(discs_clear_m(gap_m, cell_m, body, x, y, sine, cosine, AS_AT_EDGE))
+    still_seen = least_allowed_m(discs_clear_m(seen_m, cell_m, body, x, y, sine, cosine, 0.0))
     fastest_m_s = max(abs(start.speed_m_s), abs(told_m_s))
     for before in range(early):
         fastest_m_s = max(fastest_m_s, abs(pending[before, 0]))
-    roomy_m = margin_m + margin_s * fastest_m_s + most_m + BETWEEN_CELLS * cell_m
+    between_m = BETWEEN_CELLS * cell_m
+    roomy_m = margin_m + margin_s * fastest_m_s + most_m + between_m
     step, spare, sure_m = 0, FAR_M, 0.0
     while step < early + held or abs(speed) > 0.02 or abs(turn) > 0.02:
         if step == turning.shape[0]:
@@ -109,15 +115,19 @@ def _spare_m(told_m_s, held, turning, margin_m, margin_s, problem, least_m, most
         step += 1
         if sure_m > 0.0:
             continue
-        # As ``clearance_m``, written out: here that takes a third less.
-        clear_m = at_place(gap_m, cell_m, x, y, AS_AT_EDGE) - body.around_m
-        if clear_m <= ROOMY_M:
-            clear_m = discs_clear_m(gap_m, cell_m, body, x, y, sine, cosine, AS_AT_EDGE)
+        # The circle round the outline first: mostly that is enough.
+        most_room_m = margin_m + margin_s * abs(speed)
         clear_seen_m = at_place(seen_m, cell_m, x, y, 0.0) - body.around_m
-        if clear_seen_m <= ROOMY_M:
-            clear_seen_m = discs_clear_m(seen_m, cell_m, body, x, y, sine, cosine, 0.0)
-        sure_m = min(clear_m, clear_seen_m) - roomy_m
-        room_m = min(margin_m + margin_s * abs(speed), still_allowed_m(still, start, (x, y)))
+        sure_m = clear_seen_m - roomy_m
+        if clear_seen_m - between_m - most_room_m >= spare:
+            continue
+        clear_seen_m = discs_clear_m(seen_m, cell_m, body, x, y, sine, cosine, 0.0)
+        sure_m = max(sure_m, clear_seen_m - roomy_m)
+        # What stands is no nearer than what is unseen.
+        if clear_seen_m - most_room_m >= spare:
+            continue
+        clear_m = discs_clear_m(gap_m, cell_m, body, x, y, sine, cosine, AS_AT_EDGE)
+        room_m = min(most_room_m, still_allowed_m(still, start, (x, y)))
         spare = min(spare, clear_m - room_m, clear_seen_m - min(margin_m, still_seen))
         if spare < least_m:
             break
@@ -136,6 +146,20 @@ def _least_spare_m(told_m_s, held, turnings, margin_m, margin_s, problem, least_
 
 
 @njit(cache=True, nogil=True)
+def _way_it_may_not(told_m_s, held, turnings, margin_m, margin_s, problem, first):
+    """One of these ways to turn in which a rover that is told this may not be left alone; -1 if it may in all.
+
+    The way numbered ``first`` is looked at first: what is told next mostly fails in the same way.
+    """
+    ways = turnings.shape[0]
+    for nth in range(ways):
+        way = (first + nth) % ways
+        if _spare_m(told_m_s, held, turnings[way], margin_m, margin_s, problem, 0.0, 0.0) < 0.0:
+            return way
+    return -1
+
+
+@njit(cache=True, nogil=True)
 def _steps(lasts_s, problem):
     return int(math.ceil(lasts_s / problem.step_s))
 
@@ -147,7 +171,7 @@ def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem):
     Whether the rover turns by any of the factors ``gains``. A few speeds are tried, and then some between the fastest
     of them that may be told and the next.
     """
-    model, held = problem.model, _steps(lasts_s, problem)
+    model, held, hardest = problem.model, _steps(lasts_s, problem), 0
     fastest_m_s = max(model.fastest_m_s, model.backwards_m_s)
     admitted = np.zeros((turns_rad_s.size, 2))
     for at in range(turns_rad_s.size):
@@ -155,9 +179,11 @@ def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem):
         for side in range(2):
             most = model.fastest_m_s if side == 0 else -model.backwards_m_s
             share, step = 1.0, 1.0 / TRIED
-            while share > 0.5 * step and (
-                _least_spare_m(most * share * share, held, turnings, margin_m, margin_s, problem, 0.0, 0.0) < 0.0
-            ):
+            while share > 0.5 * step:
+                way = _way_it_may_not(most * share * share, held, turnings, margin_m, margin_s, problem, hardest)
+                if way < 0:
+                    break
+                hardest = way
                 share -= step
             if share < 0.5 * step:
                 continue
@@ -166,8 +192,11 @@ def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem):
                     step *= 0.5
                     faster = share + step
                     tried = most * faster * faster
-                    if _least_spare_m(tried, held, turnings, margin_m, margin_s, problem, 0.0, 0.0) >= 0.0:
+                    way = _way_it_may_not(tried, held, turnings, margin_m, margin_s, problem, hardest)
+                    if way < 0:
                         share = faster
+                    else:
+                        hardest = way
             admitted[at, side] = abs(most * share * share)
     return admitted
 

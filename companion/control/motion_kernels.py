@@ -47,8 +47,9 @@ touch the next thing as deep."""
 class MotionGround(NamedTuple):
     """The ground round the rover: rasters of one shape, a cell's side, and a raster of coarser cells.
 
-    ``gap_m``: from a cell to the nearest obstacle. ``seen_m``: to the nearest obstacle or unseen place. ``togo_s``:
-    time left from a cell of ``togo_cell_m``; inf where no way leads. ``ends``: the rover stops where it is 0.
+    ``gap_m``: from a cell to the nearest obstacle. ``seen_m``: to the nearest obstacle or unseen place, such as the
+    raster's edge. ``togo_s``: time left from a cell of ``togo_cell_m``; inf where no way leads. ``ends``: the rover
+    stops where it is 0.
     """
 
     gap_m: Any
@@ -174,9 +175,8 @@ def discs_clear_m(raster, cell_m, body, x_m, y_m, sine, cosine, outside_m):
 
 
 @njit(cache=True, nogil=True)
-def least_allowed_m(raster, cell_m, body, start, outside_m=AS_AT_EDGE):
-    """The clearance that a rover which is too near to something must keep."""
-    now_m = clearance_m(raster, cell_m, body, start.x_m, start.y_m, start.heading_rad, outside_m)
+def least_allowed_m(now_m):
+    """The clearance that a rover must keep which is too near to something: so near as it is now."""
     return min(max(now_m - NEARER_M, NEAREST_M), now_m)
 
 
@@ -253,7 +253,7 @@ def cost_s(knots, problem):
     if early > 0:
         last = pending[early - 1]
         extra = weights.change * (abs(knots[0, 0] - last[0]) + abs(knots[0, 1] - last[1]))
-    least = least_allowed_m(gap_m, cell_m, body, start)
+    least = least_allowed_m(clearance_m(gap_m, cell_m, body, start.x_m, start.y_m, start.heading_rad, AS_AT_EDGE))
     first_s = left_s(togo_s, togo_cell_m, start.x_m, start.y_m)
     between_m = BETWEEN_CELLS * cell_m
     matters_m = max(weights.near_m, weights.margin_m + weights.margin_s * _fastest_m_s(knots, start, model)) + between_m

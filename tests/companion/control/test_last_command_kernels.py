@@ -11,20 +11,26 @@ from hypothesis import strategies as st
 
 from companion.control.last_command_kernels import admitted_speeds, may_be_last, spare_m
 from companion.control.motion_kernels import (
+    AS_AT_EDGE,
     BLOCKED_S,
     MotionProblem,
     Start,
     clearance_m,
     cost_s,
+    discs_clear_m,
     moved,
 )
 from tests.companion.control.test_motion_kernels import BODY, CELL_M, MODEL, SIDE, STANDING, constant, problem
 
 
 def among(posts: list[tuple[int, int]], start: Start, unseen_from: int) -> MotionProblem:
-    """Ground with posts, each named by its first row and column."""
+    """Ground with posts, each named by its first row and column. Its edges are unseen, as in every window."""
     walls = [(row, row + 3, column, column + 2) for row, column in posts]
-    return problem(*walls, start=start, unseen_from=unseen_from)
+    made = problem(*walls, start=start, unseen_from=unseen_from)
+    cells = np.minimum(np.arange(SIDE), np.arange(SIDE)[::-1])
+    edge_m = CELL_M * (np.minimum(cells[:, None], cells) - 0.5)
+    seen_m = np.minimum(made.ground.seen_m, edge_m.astype(np.float32))
+    return made._replace(ground=made.ground._replace(seen_m=seen_m))
 
 
 @pytest.mark.parametrize("margin_m", [0.0, 0.05])
@@ -142,10 +148,28 @@ def test_what_is_spared_is_what_the_model_says_step_by_step(
         while step < 22 or abs(state[3]) > 0.02 or abs(state[4]) > 0.02:
             now = told.pending[step] if step < 2 else (told_m_s, turn_rad_s) if step < 22 else (0.0, 0.0)
             state, step = moved(state, now[0], gain * now[1], MODEL, 0.1), step + 1
-            clear_m = clearance_m(ground.gap_m, CELL_M, BODY, *state[:3])
-            seen_m = clearance_m(ground.seen_m, CELL_M, BODY, *state[:3], 0.0)
+            clear_m = discs_clear_m(ground.gap_m, CELL_M, BODY, *_turned(state), AS_AT_EDGE)
+            seen_m = discs_clear_m(ground.seen_m, CELL_M, BODY, *_turned(state), 0.0)
             expected_m = min(expected_m, clear_m - 0.03 - 0.1 * abs(state[3]), seen_m - 0.03)
     assert spare_m(told_m_s, turn_rad_s, 2.0, gains, 0.03, 0.1, told) == pytest.approx(expected_m, abs=1e-9)
+
+
+def _turned(state: tuple[float, ...]) -> tuple[float, float, float, float]:
+    """Its place, and sine and cosine of its heading."""
+    return state[0], state[1], math.sin(state[2]), math.cos(state[2])
+
+
+def test_beside_a_long_rover_there_is_the_room_of_its_flank_however_much_it_must_keep() -> None:
+    """At 2 m/s it comes between walls that its flanks keep 1.15 m from, and its circle 0.55 m."""
+    long, rolling = BODY._replace(ahead_m=np.linspace(-0.6, 0.6, 7), around_m=0.85), Start(5.0, 2.0, 0.0, 2.0, 0.0)
+    walls = ((31, SIDE, 34, 36), (31, SIDE, 64, 66))
+    between = problem(*walls, start=rolling)._replace(body=long, pending=np.empty((0, 2)))
+    room_m = discs_clear_m(between.ground.gap_m, CELL_M, long, 5.0, 4.0, 0.0, 1.0, AS_AT_EDGE)
+    assert 1.1 < room_m < 1.2
+    for margin_s, may in ((0.5, True), (0.7, False)):
+        assert may_be_last(2.0, 0.0, 2.0, (1.0,), 0.03, margin_s, between) is may
+    admitted_m_s = admitted_speeds(np.zeros(1), 2.0, (1.0,), 0.03, 0.5, between)
+    assert admitted_m_s[0, 0] == MODEL.fastest_m_s
 
 
 @pytest.mark.parametrize(("before_m_s", "turn_rad_s"), [(2.0, 0.0), (2.0, 1.5), (0.0, 1.5)])
