@@ -12,7 +12,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, cast
 
 from companion.cli import kernel_cache
-from companion.core.interrupts import is_interrupt
+from companion.core.interrupts import Terminated, is_interrupt
 from companion.core.own_parts import OwnPartError
 
 if TYPE_CHECKING:  # loaded when something is wrong, as they take long
@@ -74,7 +74,7 @@ class _Terminated:
             signal.signal(number, signal.SIG_DFL)
             os.kill(os.getpid(), number)
         self.asked = True
-        raise KeyboardInterrupt
+        raise Terminated
 
 
 def unsuitable(greatest_int: int) -> str:

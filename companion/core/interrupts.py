@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import Self
 
@@ -17,18 +17,30 @@ class SignalExit(SystemExit):
     """A signal asked for the end of the program. What else ends it with SystemExit is somebody's fault."""
 
 
+class Terminated(KeyboardInterrupt):
+    """SIGTERM has interrupted a command that it ends as Ctrl-C does."""
+
+
 def is_interrupt(error: BaseException | None) -> bool:
     """Whether a KeyboardInterrupt or a SignalExit is behind this error, however many others lie between.
 
     An interrupt inside a compiled loop comes out as one SystemError, or as several.
     """
+    return any(isinstance(one, KeyboardInterrupt | SignalExit) for one in _behind(error))
+
+
+def was_terminated(error: BaseException | None) -> bool:
+    """Whether the interrupt behind this error is SIGTERM."""
+    return any(isinstance(one, Terminated) for one in _behind(error))
+
+
+def _behind(error: BaseException | None) -> Iterator[BaseException]:
+    """An error, what caused it, what caused that, and so on."""
     seen: set[int] = set()
     while error is not None and id(error) not in seen:
-        if isinstance(error, KeyboardInterrupt | SignalExit):
-            return True
+        yield error
         seen.add(id(error))
         error = error.__cause__ or error.__context__
-    return False
 
 
 class WholeSteps:

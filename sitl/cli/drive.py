@@ -26,7 +26,7 @@ from companion.cli.mission import warn_of_world
 from companion.cli.source import warn_of_places, warning
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
-from companion.core.interrupts import is_interrupt
+from companion.core.interrupts import is_interrupt, was_terminated
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
 from companion.lidar.spec import LidarError, LidarSpec, parsed
@@ -152,7 +152,7 @@ def drive(
         if not is_interrupt(error):
             raise
         _print_last(painter, rows_below=1)
-        kept = _kept(run, recorder, wanted, console)
+        kept = _kept(run, recorder, wanted, console, _why(error))
         raise StoppedError(f"{_stopped(run)}; {'; '.join(kept) or 'nothing was written'}") from None
     recorder.close(ended_by=run.ended_by(EndReason.TIME_LIMIT))
     _print_results(report, console, mission, settings)
@@ -198,9 +198,14 @@ def _file(sensors: str | None) -> Path | None:
     return Path(sensors) if sensors is not None and sensors.endswith(".toml") else None
 
 
-def _kept(run: Drive | None, recorder: Recorder | NullRecorder, wanted: Outputs, console: Console) -> list[str]:
+def _why(interrupt: BaseException) -> EndReason:
+    return EndReason.TERMINATED if was_terminated(interrupt) else EndReason.STOPPED_BY_USER
+
+
+def _kept(
+    run: Drive | None, recorder: Recorder | NullRecorder, wanted: Outputs, console: Console, stopped: EndReason
+) -> list[str]:
     """What was recorded of a drive that was interrupted is kept, and its report written; tells where they are."""
-    stopped = EndReason.STOPPED_BY_USER
     recorder.close(ended_by=stopped if run is None else run.ended_by(stopped))
     if not isinstance(recorder, Recorder):
         return []
@@ -265,7 +270,7 @@ def _telling(page: LiveViewer | None) -> Iterator[None]:
         raise
     except (KeyboardInterrupt, Exception) as error:
         if page is not None and is_interrupt(error):
-            page.end(EndReason.STOPPED_BY_USER)
+            page.end(_why(error))
         elif page is not None and isinstance(error, Exception):
             page.fail(error)
         raise

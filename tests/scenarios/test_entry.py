@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 
 from companion.cli.commands import app as companion_commands
 from companion.cli.entry import StoppedError, start
+from companion.core.interrupts import Terminated
 from companion.recording.reader import load_record
 from companion.safety.reasons import EndReason
 from sitl.cli.commands import app as sitl_commands
@@ -144,18 +145,25 @@ plan.budget_of = lambda effort: print("searches", flush=True) or budget_of(effor
     assert (child.returncode, out, errors) == (130, "", "rover-companion: stopped by Ctrl-C\n")
 
 
+@pytest.mark.parametrize(
+    ("interrupt", "reason"), [(KeyboardInterrupt, EndReason.STOPPED_BY_USER), (Terminated, EndReason.TERMINATED)]
+)
 def test_a_drive_interrupted_in_a_compiled_loop_keeps_its_record_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    interrupt: type[KeyboardInterrupt],
+    reason: EndReason,
 ) -> None:
     def interrupted(*arguments: object, **options: object) -> None:
-        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+        raise SystemError("returned a result with an exception set") from interrupt()
 
     monkeypatch.setattr("sitl.cli.drive.Drive", interrupted)
     record = tmp_path / "record"
     drive = ["drive", "missions/open.toml", "--record", str(record)]
     assert start("rover-sitl", lambda: partial(sitl_commands, drive)) == 130
     assert capsys.readouterr().err.endswith(f"rover-companion report {record} shows it\n")
-    assert json.loads((record / "meta.json").read_text())["ended_by"] == EndReason.STOPPED_BY_USER.name
+    assert json.loads((record / "meta.json").read_text())["ended_by"] == reason.name
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
@@ -180,7 +188,8 @@ def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_and_rep
     assert errors.startswith(f"stopped by {word}: Rooms after ") and "0 of 1 targets reached" in errors
     assert f"; report: {report} (" in errors and report.read_text().endswith("</html>\n")
     assert errors.endswith(f"; record so far: {record}; rover-companion report {record} shows it\n")
-    assert load_record(record).meta.end_reason is EndReason.STOPPED_BY_USER
+    why = EndReason.STOPPED_BY_USER if number is signal.SIGINT else EndReason.TERMINATED
+    assert load_record(record).meta.end_reason is why
     assert all((record / name).stat().st_size > 0 for name in ("link.tlog", "map.yaml", "map.pgm"))
 
 
