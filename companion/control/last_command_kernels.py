@@ -83,8 +83,8 @@ def _spare_m(told_m_s, held, turning, margin_m, margin_s, problem, least_m, most
 
     It is told a speed for ``held`` steps and then to stand, and turns as ``turning`` says, one of ``_turnings``. It
     must keep ``margin_m``, and ``margin_s`` more for each m/s, over ground that is free and seen.
-    Exact only between ``least_m`` and ``most_m``: where it is surely less, the rest of the way is not looked at, and
-    where it is surely more, the rover is followed without a look until it may have come nearer.
+    ``most_m`` where it is more. Exact from ``least_m`` on: where it is surely less, the rest of the way is not looked
+    at. Where it is surely more than ``most_m``, the rover is followed without a look until it may have come nearer.
     """
     start, ground, body, model = problem.start, problem.ground, problem.body, problem.model
     pending, step_s = problem.pending, problem.step_s
@@ -99,7 +99,7 @@ def _spare_m(told_m_s, held, turning, margin_m, margin_s, problem, least_m, most
         fastest_m_s = max(fastest_m_s, abs(pending[before, 0]))
     between_m = BETWEEN_CELLS * cell_m
     roomy_m = margin_m + margin_s * fastest_m_s + most_m + between_m
-    step, spare, sure_m = 0, FAR_M, 0.0
+    step, spare, sure_m = 0, most_m, 0.0
     while step < early + held or abs(speed) > 0.02 or abs(turn) > 0.02:
         if step == turning.shape[0]:
             return -FAR_M
@@ -129,17 +129,6 @@ def _spare_m(told_m_s, held, turning, margin_m, margin_s, problem, least_m, most
         clear_m = discs_clear_m(gap_m, cell_m, body, x, y, sine, cosine, AS_AT_EDGE)
         room_m = min(most_room_m, still_allowed_m(still, start, (x, y)))
         spare = min(spare, clear_m - room_m, clear_seen_m - min(margin_m, still_seen))
-        if spare < least_m:
-            break
-    return spare
-
-
-@njit(cache=True, nogil=True)
-def _least_spare_m(told_m_s, held, turnings, margin_m, margin_s, problem, least_m, most_m):
-    """``_spare_m`` in the worst of these ways to turn."""
-    spare = FAR_M
-    for way in range(turnings.shape[0]):
-        spare = min(spare, _spare_m(told_m_s, held, turnings[way], margin_m, margin_s, problem, least_m, most_m))
         if spare < least_m:
             break
     return spare
@@ -207,23 +196,30 @@ def may_be_last(told_m_s, told_rad_s, lasts_s, gains, margin_m, margin_s, proble
 
     The rover keeps ``margin_m``, and ``margin_s`` more for each m/s, whether it turns by any of the factors ``gains``.
     """
-    return spare_m(told_m_s, told_rad_s, lasts_s, gains, margin_m, margin_s, problem, 0.0, 0.0) >= 0.0
+    held = _steps(lasts_s, problem)
+    turnings = _turnings(told_rad_s, held, gains, abs(told_m_s), problem)
+    return _way_it_may_not(told_m_s, held, turnings, margin_m, margin_s, problem, 0) < 0
 
 
 @njit(cache=True, nogil=True)
 def spare_m(told_m_s, told_rad_s, lasts_s, gains, margin_m, margin_s, problem, least_m=-math.inf, most_m=FAR_M):
     """How much more room than it must keep such a rover has, at the worst place.
 
-    Exact between ``least_m`` and ``most_m`` only.
+    ``most_m`` where it is more; exact only from ``least_m`` on.
     """
     held = _steps(lasts_s, problem)
     turnings = _turnings(told_rad_s, held, gains, abs(told_m_s), problem)
-    return _least_spare_m(told_m_s, held, turnings, margin_m, margin_s, problem, least_m, most_m)
+    spare = most_m
+    for way in range(len(gains)):
+        spare = min(spare, _spare_m(told_m_s, held, turnings[way], margin_m, margin_s, problem, least_m, most_m))
+        if spare < least_m:
+            break
+    return spare
 
 
 @njit(cache=True, nogil=True)
 def braking_spares_m(turns_rad_s, lasts_s, gains, most_m, problem):
-    """``spare_m`` of a rover that is told to stand and to turn, for each turn rate; not exact above ``most_m``."""
+    """``spare_m`` of a rover that is told to stand and to turn, for each turn rate; ``most_m`` where it is more."""
     spares = np.empty(turns_rad_s.size)
     for at in range(turns_rad_s.size):
         spares[at] = spare_m(0.0, turns_rad_s[at], lasts_s, gains, 0.0, 0.0, problem, -math.inf, most_m)
