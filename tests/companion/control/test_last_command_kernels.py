@@ -129,6 +129,7 @@ def test_where_there_is_surely_room_no_look_is_needed(
     st.floats(-0.5, 2.0),
     st.floats(-1.5, 1.5),
     st.floats(-0.5, 2.0),
+    st.sampled_from([0.0, 0.5]),
     st.sampled_from([(1.0,), (1.3, 0.6, 1.0)]),
 )
 def test_what_is_spared_is_what_the_model_says_step_by_step(
@@ -137,11 +138,12 @@ def test_what_is_spared_is_what_the_model_says_step_by_step(
     told_m_s: float,
     turn_rad_s: float,
     now_m_s: float,
+    turns_already: float,
     gains: tuple[float, ...],
 ) -> None:
     """Two steps of what was told before, twenty of the command, then to a stop; over ground that is not seen, too."""
-    start = Start(5.0, 2.0, 0.3, now_m_s, 0.5 * turn_rad_s)
-    told = among(posts, start, unseen_from)._replace(pending=np.array([[0.7, -0.4], [0.2, 0.9]]))
+    start = Start(5.0, 2.0, 0.3, now_m_s, turns_already * turn_rad_s)
+    told = among(posts, start, unseen_from)._replace(pending=np.array([[0.7, 0.0], [0.2, 0.9]]))
     expected_m, ground = 10.0, told.ground
     for gain in gains:
         state, step = tuple(start), 0
@@ -152,6 +154,38 @@ def test_what_is_spared_is_what_the_model_says_step_by_step(
             seen_m = discs_clear_m(ground.seen_m, CELL_M, BODY, *_turned(state), 0.0)
             expected_m = min(expected_m, clear_m - 0.03 - 0.1 * abs(state[3]), seen_m - 0.03)
     assert spare_m(told_m_s, turn_rad_s, 2.0, gains, 0.03, 0.1, told) == pytest.approx(expected_m, abs=1e-9)
+
+
+@given(
+    st.lists(st.tuples(st.integers(24, 60), st.integers(30, 70)), min_size=1, max_size=12),
+    st.floats(-0.5, 2.0),
+    st.floats(0.0, 0.3),
+)
+def test_what_is_admitted_may_be_told_whichever_way_the_rover_turns(
+    posts: list[tuple[int, int]], now_m_s: float, margin_s: float
+) -> None:
+    ground, gains = among(posts, Start(5.0, 2.0, 0.1, now_m_s, 0.0), SIDE), (1.3, 0.6, 1.0)
+    turns_rad_s = np.array((-1.0, -0.3, 0.0, 0.3, 1.0))
+    for turn_rad_s, most in zip(
+        turns_rad_s, admitted_speeds(turns_rad_s, 1.0, gains, 0.03, margin_s, ground), strict=True
+    ):
+        for told_m_s in (most[0], -most[1]):
+            assert told_m_s == 0.0 or all(
+                may_be_last(told_m_s, turn_rad_s, 1.0, (gain,), 0.03, margin_s, ground) for gain in gains
+            )
+
+
+def test_unseen_ground_beside_it_does_not_let_it_come_nearer_to_what_stands() -> None:
+    """The rover's side is 5 cm from unseen ground; it must keep 0.2 m from a wall ahead."""
+    start = STANDING._replace(y_m=2.0)
+    made = problem((40, 42, 0, SIDE), start=start)
+    seen_m = np.minimum(made.ground.seen_m, (CELL_M * np.arange(SIDE) - start.x_m + BODY.radius_m + 0.1)[None, ::1])
+    told = made._replace(ground=made.ground._replace(seen_m=seen_m.astype(np.float32)))
+    beside_m = discs_clear_m(told.ground.seen_m, CELL_M, BODY, start.x_m, start.y_m, 0.0, 1.0, 0.0)
+    assert 0.0 < beside_m < 0.1
+    passed = [speed for speed in np.arange(0.05, 1.5, 0.01) if may_be_last(speed, 0.0, 3.0, (1.0,), 0.2, 0.0, told)]
+    free = [speed for speed in np.arange(0.05, 1.5, 0.01) if may_be_last(speed, 0.0, 3.0, (1.0,), 0.2, 0.0, made)]
+    assert 0.1 < max(passed) == max(free) < 1.0
 
 
 def _turned(state: tuple[float, ...]) -> tuple[float, float, float, float]:
@@ -172,15 +206,20 @@ def test_beside_a_long_rover_there_is_the_room_of_its_flank_however_much_it_must
     assert admitted_m_s[0, 0] == MODEL.fastest_m_s
 
 
-@pytest.mark.parametrize(("before_m_s", "turn_rad_s"), [(2.0, 0.0), (2.0, 1.5), (0.0, 1.5)])
-def test_no_look_is_left_out_where_a_long_rover_turns_or_has_been_told_to_go_faster(
-    before_m_s: float, turn_rad_s: float
+@pytest.mark.parametrize(
+    ("now_m_s", "before_m_s", "turn_rad_s"), [(0.0, 2.0, 0.0), (0.0, 2.0, 1.5), (0.0, 0.0, 1.5), (2.0, 0.0, 0.0)]
+)
+def test_no_look_is_left_out_where_a_long_rover_turns_or_is_faster_than_told(
+    now_m_s: float, before_m_s: float, turn_rad_s: float
 ) -> None:
-    """Told to stand, it first does what it was told before; walls ahead and beside it, at every distance."""
+    """Told to stand, it first does what it was told before; walls ahead and beside it and a post, at every distance."""
     long = BODY._replace(ahead_m=np.array([-0.6, -0.2, 0.2, 0.6]), around_m=0.85)
     for near in range(4, 30):
-        for wall in ((20 + near, 22 + near, 0, SIDE), (0, SIDE, 50 + near, 52 + near)):
-            told = problem(wall)._replace(body=long, pending=np.tile((before_m_s, turn_rad_s), (12, 1)))
+        post = (20 + near, 22 + near, 58, 60)
+        for wall in ((20 + near, 22 + near, 0, SIDE), (0, SIDE, 50 + near, 52 + near), post):
+            told = problem(wall, start=STANDING._replace(speed_m_s=now_m_s))._replace(
+                body=long, pending=np.tile((before_m_s, turn_rad_s), (12, 1))
+            )
             for margin_s in (0.0, 0.3):
                 given = (0.0, turn_rad_s, 1.0, (1.0,), 0.03, margin_s, told)
                 exact_m = spare_m(*given)
