@@ -39,6 +39,7 @@ def experiment(
     worlds: given.Worlds = None,
     controllers: given.Controllers = None,
     setups: given.Setups = None,
+    lidar: given.Lidar = None,
     missions: given.Missions = None,
     guard: given.Guard = False,
     off: given.Off = OFF_MODEL,
@@ -59,8 +60,8 @@ def experiment(
         runs = runs or (given.RUNS_OF_BARN if name == "barn" else given.RUNS)
         options = Options(
             runs, seed, jobs, maps, tuple(world or ()), given.names_given("--planners", planners), worlds,
-            given.names_given("--controllers", controllers), given.names_given("--setups", setups), guard, off, late,
-            keep, given.names_given("--missions", missions), given.outline_m(outline), turning_radius,
+            given.names_given("--controllers", controllers), given.names_given("--setups", setups), lidar, guard, off,
+            late, keep, given.names_given("--missions", missions), given.outline_m(outline), turning_radius,
         )  # fmt: skip
         given.refuse_unused(name, options)
         _check_keep(keep)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import ClassVar
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from companion.core.footprint import Footprint
+from companion.lidar.models import NAMES, model_named
+from companion.lidar.spec import LidarSpec, parsed
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
@@ -41,7 +43,8 @@ from sitl.experiments.experiment import (
 from sitl.experiments.off_model import SHIPPED, Limits, off_model
 from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table, without_intervals
 from sitl.lockstep import Drive
-from sitl.scenario import SOMEWHERE, Scenario, outline_of
+from sitl.scenario import SOMEWHERE, Scenario, outline_of, with_lidars
+from sitl.sensors.lidar_bytes import MAKES
 from sitl.sensors.range_sensors import Lidar, SensorSuite
 from sitl.world.truth import SimStart
 
@@ -56,6 +59,8 @@ FASTEST, SLOWEST = 2.0, 8.0
 OLD_FASTEST = 4.0
 LIDAR = Lidar(3.75, -135.0 + 0.5 * 3.75, 0.06, 10.0, 20.0, 10, 72)
 """270 degrees, 10 m, 720 rays. A MAVLink message has room for 72 distances: each is the shortest of ten rays."""
+ON_COMPANION = "mask=135..225,max=10"
+"""The part of a lidar that the companion reads itself which counts: no more than the challenge's lidar sees."""
 WARM_S = 60.0
 """So long the rover may take until it moves."""
 MADE = 50
@@ -155,21 +160,24 @@ def drive(
     setup: Setup = Setup.GUARDED,
     off: float = OFF_MODEL,
     late_s: float = 0.0,
+    lidar: str | None = None,
     settings: Settings | None = None,
 ) -> BarnRun:
     """One run. ``off``: the rover differs by up to this share from what the companion takes it for.
 
-    ``late_s``: so long each message takes over the link, each way.
+    ``late_s``: so long each message takes over the link, each way. ``lidar``: the model of one that the companion reads
+    itself; None: its distances come over MAVLink.
     """
     start, mission = SimStart(START_M[1], START_M[0], 0.0, SOMEWHERE), mission_of(world)
     drivetrain, limits = off_model(np.random.default_rng((world.number, seed, 30)), off, limits_of(setup))
     guard = {} if controller == POINTS or setup is Setup.STRICT else GUARD
     parameters = {"WP_SPEED": SPEED_M_S, **RECOMMENDED_PARAMETERS, **limits, **guard}
-    scenario = Scenario(
-        world.world(), start, SensorSuite(LIDAR), outline_of(mission.rover), parameters, drivetrain=drivetrain
-    )
+    lidars = () if lidar is None else (_on_companion(lidar),)
+    sensors = SensorSuite() if lidars else SensorSuite(LIDAR)
+    plain = Scenario(world.world(), start, sensors, outline_of(mission.rover), parameters, drivetrain=drivetrain)
     given, limit_s = settings or settings_for(controller, setup), WARM_S + LIMIT_S
-    run = Drive(mission, scenario, given, seed, NullRecorder(), limit_s, late_s=late_s)
+    scenario = with_lidars(plain, lidars)
+    run = Drive(mission, scenario, given, seed, NullRecorder(), limit_s, late_s=late_s, lidars=lidars)
     simulator, began_s, track, end = run.simulator, math.inf, [(start.east_m, start.north_m)], None
     seconds = 0.0
     while end is None:
@@ -190,6 +198,10 @@ def drive(
     return BarnRun(controller, setup, world.number, seed, end, seconds, world.optimal_s, np.array(track))
 
 
+def _on_companion(model: str) -> LidarSpec:
+    return parsed(f"{model}:{ON_COMPANION}", "simulated")
+
+
 @dataclass(frozen=True)
 class BarnReport(ExperimentReport):
     """See ``ExperimentReport``."""
@@ -203,7 +215,7 @@ class BarnReport(ExperimentReport):
     @property
     def section_name(self) -> str:
         """See ``ExperimentReport``; other setups than the usual one, or one controller alone, stand beside it."""
-        return super().section_name + "".join(f"-{one}" for one in self._others())
+        return super().section_name + "".join(f"-{one.lower()}" for one in self._others())
 
     def tables(self) -> list[Table]:
         """How hard the worlds are, and one a setup, with a row a controller."""
@@ -228,6 +240,21 @@ class BarnReport(ExperimentReport):
         """Of the worlds' measures."""
         return spread_rows([difficulty_of(world) for world in self.worlds])
 
+    def _lidar(self) -> str:
+        """What the rover sees with, in words."""
+        if self.options.lidar is None:
+            return (
+                "Its lidar has 720 rays over 270 degrees that reach 10 m; the companion\n"
+                f"gets {LIDAR.sectors} distances over MAVLink, each the shortest of {LIDAR.rays} rays."
+            )
+        spec = _on_companion(self.options.lidar)
+        make = MAKES[spec.model.name]
+        rays = round(0.75 * make.points_hz / make.turns_hz)
+        return (
+            f"The companion reads its lidar itself ({spec.model.name}, {make.turns_hz:g}\n"
+            f"turns a second); 270 degrees and 10 m of it count: {rays} rays a turn; the challenge's lidar has 720."
+        )
+
     def _driven(self) -> str:
         """Which worlds, in words."""
         number, archive = len(self.worlds), self.options.archive
@@ -241,11 +268,12 @@ class BarnReport(ExperimentReport):
         return [setup for setup in Setup if any(setup is one for one, _ in self.series)]
 
     def _others(self) -> list[str]:
-        """The setups, where the usual one is not among them; the controller, where it is the only one."""
+        """The setups, where the usual one is not among them; the controller, where it is the only one; the lidar."""
+        own_lidar = [self.options.lidar] if self.options.lidar else []
         if Setup.GUARDED not in self._setups():
-            return [str(setup) for setup in self._setups()]
+            return [*map(str, self._setups()), *own_lidar]
         names = list(dict.fromkeys(name for _, name in self.series))
-        return names if len(names) == 1 else []
+        return [*(names if len(names) == 1 else []), *own_lidar]
 
     def _rows(self, setup: Setup, *, plain: bool = False) -> list[list[str]]:
         """``plain``: without intervals."""
@@ -273,9 +301,8 @@ class BarnReport(ExperimentReport):
 
 {driven[0].upper()}{driven[1:]}, {_counted(self.options.runs, "seed")} each.
 Protocol and score are those of the BARN challenge at ICRA. **In our simulator, not an entry.** The rover has a Jackal's
-outline (0.508 x 0.430 m) and drives at 2 m/s. Its lidar has 720 rays over 270 degrees that reach 10 m; the companion
-gets {LIDAR.sectors} distances, each the shortest of {LIDAR.rays} rays. In each run the rover's speed, lag and turn
-rate, and its limits of acceleration, braking and turning, are
+outline (0.508 x 0.430 m) and drives at 2 m/s. {self._lidar()}
+In each run the rover's speed, lag and turn rate, and its limits of acceleration, braking and turning, are
 {self.options.mismatch}.
 
 How hard the worlds are, along the shortest way among the posts ([measures](worlds.md#worlds-from-seeds)); so many
@@ -370,6 +397,11 @@ def is_standard(worlds: Sequence[BarnWorld]) -> bool:
 def run(options: Options, advance: Advance) -> BarnReport:
     """Every world with every controller, as many times as there are runs."""
     chosen = chosen_controllers(options, CONTROLLERS)
+    if options.lidar is not None:
+        model = model_named(options.lidar)
+        if model is None:
+            raise ExperimentError(f"--lidar {options.lidar!r:.40}: is no model; models are {NAMES}")
+        options = replace(options, lidar=model.name)
     # Positions need no guard, and the autopilot drives to them as it likes.
     pairs: list[tuple[Setup, str]] = [
         (setup, name)
@@ -384,7 +416,7 @@ def run(options: Options, advance: Advance) -> BarnReport:
     else:
         worlds = standard(read_worlds(options.archive))
     tasks = [
-        (world, name, seed, setup, options.off, options.late_s)
+        (world, name, seed, setup, options.off, options.late_s, options.lidar)
         for setup, name in pairs
         for seed in range(options.seed, options.seed + options.runs)
         for world in worlds

@@ -68,6 +68,8 @@ class Options:
     """What leads the rover, for experiments that take any; none: the experiment's own choice."""
     setups: tuple[str, ...] = ()
     """``barn``: what is driven; none: the experiment's own choice."""
+    lidar: str | None = None
+    """``barn``: the model of the lidar that the companion reads itself; None: distances come over MAVLink."""
     guard: bool = False
     """The autopilot has the guard, for experiments in which that is to be chosen."""
     off: float = OFF_MODEL
@@ -89,6 +91,7 @@ class Options:
         chosen += f" --controllers {','.join(self.controllers)}" if self.controllers else ""
         chosen += f" --missions {','.join(self.missions)}" if self.missions else ""
         chosen += f" --setups {','.join(self.setups)}" if self.setups else ""
+        chosen += f" --lidar {self.lidar}" if self.lidar else ""
         chosen += " --guard" if self.guard else ""
         chosen += "" if self.off == OFF_MODEL else f" --off {self.off:g}"
         chosen += f" --late {self.late_s:g}" if self.late_s else ""

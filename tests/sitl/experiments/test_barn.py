@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from companion.core.footprint import Footprint
+from companion.lidar.spec import LidarSpec
 from companion.mission.mission import Mission
 from companion.settings import Settings
 from sitl.cli.commands import app
@@ -163,6 +164,37 @@ def test_over_a_late_link_it_touches_nothing(worlds: list[BarnWorld], number: in
     assert drive(world, "motion-ga", seed, late_s=0.2).end is RunEnd.REACHED
 
 
+def test_a_lidar_that_the_companion_reads_itself_leads_there_too_and_sees_no_more_than_the_challenges(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    world = made_world(3)
+    one = drive(world, "motion-ga", 0, lidar="LD19")
+    assert one.end is RunEnd.REACHED and one.seconds < 1.6 * world.optimal_s
+    report = BarnReport(Options(1, lidar="LD19"), (world,), {(Setup.GUARDED, "motion-ga"): (one,)})
+    page = " ".join(report.section().split())
+    assert "(LD19, 10 turns a second); 270 degrees and 10 m of it count: 338 rays a turn" in page
+    assert "--lidar LD19" in page and "(BARN): motion-ga and LD19" in page
+    assert report.section_name == "barn-motion-ga-ld19"
+
+    monkeypatch.setattr(barn, "Drive", drive_that_goes(9.1))
+    monkeypatch.setattr(FakeDrive, "asked", [])
+    drive(world, "motion-ga", 0, lidar="LD19")
+    (asked,) = FakeDrive.asked
+    (lidar,), (simulated,) = asked.lidars, asked.scenario.lidars
+    assert (lidar.model.name, simulated.make.name) == ("LD19", "LD19")
+    assert (lidar.mounting.masked_deg, lidar.mounting.max_m) == (((135.0, 225.0),), 10.0)
+    assert asked.scenario.sensors == SensorSuite(), "and no distances come over MAVLink"
+
+
+def test_a_lidar_is_named_as_people_write_it_and_one_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(barn, "Drive", drive_that_goes(9.1))
+    monkeypatch.setattr(barn, "MADE", 1)
+    asked = Options(1, lidar="ld-19", controllers=("dwa",))
+    assert barn.run(asked, lambda done, total: None).options.lidar == "LD19"
+    with pytest.raises(ExperimentError, match="--lidar 'LD18': is no model; models are LD06, LD19, "):
+        barn.run(replace(asked, lidar="LD18"), lambda done, total: None)
+
+
 @pytest.mark.thorough
 def test_points_take_more_than_twice_the_time_there() -> None:
     motions, points = (drive(made_world(5), name, 0) for name in ("motion-ga", "points"))
@@ -211,7 +243,7 @@ def test_title_and_page_say_what_is_driven(archive: Path | None, numbers: Sequen
     assert str(hard.title) == f"barn: {driven.removesuffix(', 1 seed each')}, how hard they are"
     page = " ".join(report.section().split())
     assert f"{driven[0].upper()}{driven[1:]}. Protocol" in page
-    assert "gets 72 distances, each the shortest of 10 rays" in page
+    assert "gets 72 distances over MAVLink, each the shortest of 10 rays" in page
     assert ("The 3 worst runs" if len(runs) == 3 else "The 10 worst runs") in page
 
 
@@ -264,8 +296,9 @@ class FakeDrive:
 
     def __init__(
         self, mission: Mission, scenario: Scenario, settings: Settings, seed: int, recorder: object,
-        limit_s: float, late_s: float,
+        limit_s: float, late_s: float, lidars: tuple[LidarSpec, ...],
     ) -> None:  # fmt: skip
+        self.lidars = lidars
         self.mission, self.scenario, self.settings, self.limit_s = mission, scenario, settings, limit_s
         self.simulator = self.companion = self
         self.time_s, self.done, self.collisions = 0.0, False, ()
