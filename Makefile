@@ -66,8 +66,9 @@ results: $(TOOLS)
 	$(BIN)/rover-sitl experiment driving --runs 30 --docs docs
 	$(BIN)/rover-sitl experiment traffic --docs docs
 	$(BIN)/rover-sitl experiment barn --runs 2 $(BARN) --docs docs
-	for setup in guarded jackal strict; do \
-	  $(BIN)/rover-sitl experiment barn --runs 10 --controllers motion-ga --setups $$setup $(BARN) --docs docs || exit; done
+	for setup in guarded jackal strict; do for lidar in "" "--lidar LD19"; do \
+	  $(BIN)/rover-sitl experiment barn --runs 10 --controllers motion-ga --setups $$setup $$lidar $(BARN) --docs docs || exit; \
+	done; done
 	$(BIN)/rover-sitl experiment missions --runs 25 --controllers motion-ga --guard --docs docs
 	$(BIN)/rover-sitl experiment missions --runs 8 --controllers motion-ga --docs docs
 	$(BIN)/rover-sitl experiment controllers --runs 34 --controllers points,motion-ga,dwa,mppi --docs docs
