@@ -70,7 +70,7 @@ DRAGGED_STRAIGHTER_M = 0.1
 TURN_SHARES = np.linspace(-1.0, 1.0, 17)
 """Turn rates for which the fastest speed is looked for that may be told, as shares of the fastest."""
 NONE_ADMITTED = np.zeros((len(TURN_SHARES), 2))
-FASTER_S, BLUR_S, MOST_BLUR_RAD = 0.02, 1.15, math.radians(10.0)
+FASTER_S, BLUR_S, MOST_BLUR_RAD = 0.04, 1.15, math.radians(10.0)
 """Left alone, the rover keeps so much more room for each m/s; more where a reading speaks for a wide angle: how far to
 the side something ends that is as far away as the rover needs to stop is known only to within half of that."""
 LONGER_BLUR = 0.5
