@@ -93,8 +93,9 @@ class MissionsReport(ExperimentReport):
 
     @property
     def section_name(self) -> str:
-        """See ``ExperimentReport``."""
-        return super().section_name + ("-guarded" if self.options.guard else "")
+        """See ``ExperimentReport``. Later seeds stand beside those from 0 on: all at once take hours."""
+        later = f"-from-{self.options.seed}" if self.options.seed else ""
+        return super().section_name + ("-guarded" if self.options.guard else "") + later
 
     def tables(self) -> list[Table]:
         """One for each suite of sensors."""
@@ -115,7 +116,9 @@ class MissionsReport(ExperimentReport):
         """See ``ExperimentReport``."""
         tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in SUITES)
         guard = ", with the guard on the autopilot" if self.options.guard else ""
-        return f"""## Every shipped mission{guard}
+        first, after = self.options.seed, self.options.seed + self.options.runs
+        later = f", seeds {first} to {after - 1}" if first else ""
+        return f"""## Every shipped mission{guard}{later}
 
 `{self.options.command(NAME)}`
 

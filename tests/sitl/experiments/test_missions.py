@@ -65,4 +65,10 @@ def test_the_table_counts_each_mission_and_all() -> None:
     rooms, total = report._rows("lidar-360")
     assert rooms[:8] == ["Rooms", "motion-ga", "2", "1", "2", "3", "1", "120.0"] and rooms[8] == "100 to 140"
     assert total[0] == "all" and total[2:7] == ["2", "1", "2", "3", "1"]
-    assert report._rows("beams") == [] and "Every shipped mission" in report.section()
+    assert report._rows("beams") == [] and "## Every shipped mission\n" in report.section()
+
+
+def test_later_seeds_have_a_section_of_their_own() -> None:
+    later = MissionsReport(Options(runs=25, seed=25, guard=True), ())
+    assert later.section_name == "missions-guarded-from-25"
+    assert "## Every shipped mission, with the guard on the autopilot, seeds 25 to 49\n" in later.section()
