@@ -64,12 +64,19 @@ def test_wrong_usage_gets_one_line_and_exit_code_2(arguments: tuple[str, ...], w
 
 
 def test_sigterm_ends_a_command_like_an_interrupt(capsys: pytest.CaptureFixture[str]) -> None:
+    raised: list[type[BaseException]] = []
+
     def load() -> typer.Typer:
-        signal.raise_signal(signal.SIGTERM)
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt as interrupt:
+            raised.append(type(interrupt))
+            raise
         raise AssertionError("the signal has been passed over")
 
     before = signal.getsignal(signal.SIGTERM)
     assert start("rover-companion", load) == 130
+    assert raised == [Terminated]
     assert capsys.readouterr().err == "rover-companion: stopped by SIGTERM\n"
     assert signal.getsignal(signal.SIGTERM) == before
 
