@@ -12,7 +12,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, cast
 
 from companion.cli import kernel_cache
-from companion.core.interrupts import Terminated, is_interrupt
+from companion.core.interrupts import Terminated, is_interrupt, none_lost
 from companion.core.own_parts import OwnPartError
 
 if TYPE_CHECKING:  # loaded when something is wrong, as they take long
@@ -46,7 +46,8 @@ def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
     terminated = _Terminated()
     before = signal.signal(signal.SIGTERM, terminated)
     try:
-        return _run(name, load())
+        with none_lost():
+            return _run(name, load())
     except KeyboardInterrupt:
         print(f"{name}: stopped by {terminated.what}", file=sys.stderr)
         return EXIT_STOPPED

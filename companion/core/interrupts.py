@@ -1,12 +1,17 @@
-"""Ctrl-C and SIGTERM: whether an error is one, and steps that they do not cut in two."""
+"""Ctrl-C and SIGTERM: whether an error is one, that none is lost, and steps that they do not cut in two."""
 
 from __future__ import annotations
 
+import contextlib
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
-from typing import Self
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
 
 NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
@@ -41,6 +46,34 @@ def _behind(error: BaseException | None) -> Iterator[BaseException]:
         yield error
         seen.add(id(error))
         error = error.__cause__ or error.__context__
+
+
+@contextlib.contextmanager
+def none_lost() -> Iterator[None]:
+    """Within ``with``, an interrupt that came in a callback from C is raised again right after it.
+
+    No error leaves such a callback: Python prints it and goes on. The compiler is mostly in C, and calls back from it.
+    """
+    before = sys.unraisablehook
+
+    def lost(what: UnraisableHookArgs) -> None:
+        kind = what.exc_type
+        if not issubclass(kind, KeyboardInterrupt):
+            before(what)
+            return
+
+        def again(frame: FrameType, event: str, argument: object) -> None:
+            if frame.f_code is not lost.__code__:
+                sys.setprofile(None)
+                raise kind
+
+        sys.setprofile(again)  # called when the next function begins or ends
+
+    sys.unraisablehook = lost
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 class WholeSteps:

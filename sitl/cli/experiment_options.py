@@ -195,7 +195,7 @@ def refuse_unused(name: str, options: Options) -> None:
         "--worlds": options.archive,
         "--controllers": options.controllers,
         "--setups": options.setups,
-        "--lidar": options.lidar,
+        "--lidar": options.lidar is not None,
         "--missions": options.missions,
         "--guard": options.guard,
         "--off": options.off != OFF_MODEL,

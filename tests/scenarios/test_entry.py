@@ -1,5 +1,6 @@
 """How the scripts begin and end: wrong usage and an interrupt during the imports."""
 
+import ctypes
 import json
 import os
 import signal
@@ -63,12 +64,19 @@ def test_wrong_usage_gets_one_line_and_exit_code_2(arguments: tuple[str, ...], w
 
 
 def test_sigterm_ends_a_command_like_an_interrupt(capsys: pytest.CaptureFixture[str]) -> None:
+    raised: list[type[BaseException]] = []
+
     def load() -> typer.Typer:
-        signal.raise_signal(signal.SIGTERM)
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt as interrupt:
+            raised.append(type(interrupt))
+            raise
         raise AssertionError("the signal has been passed over")
 
     before = signal.getsignal(signal.SIGTERM)
     assert start("rover-companion", load) == 130
+    assert raised == [Terminated]
     assert capsys.readouterr().err == "rover-companion: stopped by SIGTERM\n"
     assert signal.getsignal(signal.SIGTERM) == before
 
@@ -122,6 +130,47 @@ def test_an_interrupt_inside_a_compiled_loop_ends_a_command_like_any_other(capsy
     assert capsys.readouterr().err == "script: stopped by Ctrl-C\n"
     with pytest.raises(SystemError, match="bad call"):
         start("script", lambda: partial(app, ["broken"]))
+
+
+@pytest.mark.parametrize(("interrupt", "word"), [(KeyboardInterrupt, "Ctrl-C"), (Terminated, "SIGTERM")])
+@pytest.mark.parametrize("fails", [False, True])
+def test_an_interrupt_in_a_callback_from_c_ends_a_command_like_any_other(
+    capsys: pytest.CaptureFixture[str], interrupt: type[KeyboardInterrupt], word: str, fails: bool
+) -> None:
+    """The compiler calls back when a kernel is made. Without what it was to do there, it may fail."""
+    app, reached = typer.Typer(), []
+
+    def interrupted() -> None:
+        if interrupt is Terminated:
+            signal.raise_signal(signal.SIGTERM)
+        raise KeyboardInterrupt
+
+    @app.command()
+    def compiles() -> None:
+        ctypes.CFUNCTYPE(None)(interrupted)()
+        if fails:
+            raise RuntimeError("no compiled object yet")
+        reached.append(str(fails))
+
+    before = sys.unraisablehook
+    assert start("script", lambda: partial(app, [])) == 130
+    assert (capsys.readouterr().err, reached) == (f"script: stopped by {word}\n", [])
+    assert sys.unraisablehook is before and sys.getprofile() is None
+
+
+def test_other_errors_in_a_callback_from_c_are_told_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    app, told = typer.Typer(), list[type[BaseException]]()
+    monkeypatch.setattr(sys, "unraisablehook", lambda what: told.append(what.exc_type))
+
+    def broken() -> None:
+        raise ValueError
+
+    @app.command()
+    def compiles() -> None:
+        ctypes.CFUNCTYPE(None)(broken)()
+
+    assert start("script", lambda: partial(app, [])) == 0
+    assert told == [ValueError]
 
 
 def test_ctrl_c_in_the_middle_of_a_compiled_search_is_one_line(tmp_path: Path) -> None:

@@ -48,6 +48,12 @@ def test_a_fast_rover_that_is_left_alone_keeps_more_room() -> None:
     assert not may_be_last(1.5, 0.0, 0.3, (1.0,), 0.0, 0.2, problem(beside, start=rolling))
 
 
+def test_so_does_one_that_backs() -> None:
+    beside = problem((40, 46, 54, 56), start=Start(5.0, 5.5, 0.0, -0.5, 0.0))
+    for margin_s, may in ((0.0, True), (0.2, True), (0.8, False)):
+        assert may_be_last(-0.5, 0.0, 3.0, (1.0,), 0.0, margin_s, beside) is may
+
+
 def test_ground_that_was_not_seen_beside_it_does_not_let_it_touch_what_was() -> None:
     """A rover whose side stands over unseen ground may go on over such ground, but into nothing."""
     started = Start(5.0, 2.0, 0.0, 0.0, 0.0)

@@ -625,6 +625,15 @@ def test_without_a_guard_a_rover_keeps_more_room_and_more_of_it_in_turns() -> No
     assert _faster_s(wide) == pytest.approx(_faster_s(replace(wide, settings=GUARDED)) + 0.1 + math.radians(5.0))
 
 
+@pytest.mark.parametrize(
+    ("beam_deg", "room_s"), [(0.4, 0.04), (0.8, 0.04), (1.9, 0.04), (2.5, 0.0502), (3.75, 0.0753), (45.0, 0.2007)]
+)
+def test_beside_a_guarded_rover_so_much_more_room_is_kept_for_each_m_s(beam_deg: float, room_s: float) -> None:
+    at = replace(view(ground(), Pose(3.0, 10.0, 0.0, 1.0), 0.5, GUARDED), following=KNOWN)
+    seen = replace(at, rover=replace(at.rover, beam_rad=math.radians(beam_deg)))
+    assert _faster_s(seen) == pytest.approx(room_s, abs=1e-4)
+
+
 def test_on_ground_that_drags_it_goes_slower_where_it_could_not_stop_if_that_ground_ended() -> None:
     evidence = ground()
     wall(evidence, 9.0, 0.0, 20.0)

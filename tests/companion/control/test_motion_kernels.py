@@ -23,6 +23,7 @@ from companion.control.motion_kernels import (
     clearance_m,
     cost_s,
     keep_within,
+    least_allowed_m,
     moved,
     next_generation,
     told_at,
@@ -84,6 +85,22 @@ def test_a_motion_that_could_not_brake_at_its_end_is_blocked() -> None:
         post = problem((row, row + 1, 50, 51), start=rolling)
         body = BODY._replace(ahead_m=np.array([0.0]), radius_m=0.2, around_m=0.2)
         assert cost_s(constant(2.0), post._replace(body=body, pending=np.full((2, 2), (2.0, 0.0)))) >= BLOCKED_S, row
+
+
+@pytest.mark.parametrize(
+    ("now_m", "least_m"), [(0.5, 0.49), (0.0, -0.01), (-0.02, -0.03), (-0.035, -0.04), (-0.04, -0.04), (-0.2, -0.2)]
+)
+def test_a_rover_that_is_too_near_may_come_a_little_nearer_but_never_far(now_m: float, least_m: float) -> None:
+    assert least_allowed_m(now_m) == pytest.approx(least_m)
+
+
+def test_a_rover_over_unseen_ground_may_touch_what_stands_no_more_than_over_seen() -> None:
+    wall = (35, 37, 0, SIDE)
+    seen, unseen = problem(wall), problem(wall, unseen_from=21)
+    free = [
+        [cost_s(constant(speed), one) < BLOCKED_S for speed in np.arange(0.05, 1.0, 0.01)] for one in (seen, unseen)
+    ]
+    assert free[0] == free[1] and any(free[0]) and not all(free[0])
 
 
 def test_what_can_be_done_now_is_not_put_off() -> None:

@@ -1,4 +1,4 @@
-"""An interrupt does not cut a step in two."""
+"""What an interrupt is, and that it does not cut a step in two."""
 
 from __future__ import annotations
 
@@ -9,7 +9,36 @@ from collections.abc import Iterator
 
 import pytest
 
-from companion.core.interrupts import WholeSteps
+from companion.core.interrupts import Terminated, WholeSteps, is_interrupt, was_terminated
+
+
+@pytest.mark.parametrize(
+    ("behind", "stops", "terminated"),
+    [(KeyboardInterrupt(), True, False), (Terminated(), True, True), (ValueError(), False, False)],
+)
+def test_what_is_behind_an_error_is_found_however_many_others_lie_between(
+    behind: BaseException, stops: bool, terminated: bool
+) -> None:
+    caused, met = SystemError("a loop"), SystemError("a loop that called it")
+    caused.__cause__, met.__context__ = behind, caused
+    for error in (behind, caused, met):
+        assert (is_interrupt(error), was_terminated(error)) == (stops, terminated)
+    assert not is_interrupt(None) and not was_terminated(None)
+
+
+def test_errors_that_lie_behind_each_other_have_an_end() -> None:
+    first, second = SystemError("first"), SystemError("second")
+    first.__cause__, second.__cause__ = second, first
+    assert not is_interrupt(first) and not was_terminated(second)
+
+
+def test_ctrl_c_after_sigterm_is_still_an_end_by_sigterm() -> None:
+    with pytest.raises(KeyboardInterrupt) as caught:
+        try:
+            raise Terminated
+        finally:
+            raise KeyboardInterrupt
+    assert was_terminated(caught.value)
 
 
 @pytest.fixture(params=[signal.SIGINT, signal.SIGTERM])

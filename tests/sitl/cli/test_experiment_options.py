@@ -46,6 +46,18 @@ def test_an_empty_outline_is_none() -> None:
     assert refused("gates", "--outline", "").startswith("--outline '': give length and width")
 
 
+@pytest.mark.parametrize("model", ["LD19", ""])
+def test_a_lidar_is_for_barn_alone(model: str) -> None:
+    said = refused("gates", "--runs", "1", "--lidar", model)
+    assert said == "--lidar: gates does not take it; the option is for barn\n"
+
+
+@pytest.mark.parametrize("model", ["LD18", "", "LD19:max=5"])
+def test_a_lidar_that_is_no_model_is_refused_before_the_work(model: str) -> None:
+    said = refused("barn", "--runs", "1", "--setups", "strict,jackal", "--lidar", model)
+    assert said.startswith(f"--lidar {model!r}: is no model; models are LD06, LD19, ")
+
+
 @pytest.mark.parametrize("name", WITHOUT_MAPS)
 def test_maps_that_an_experiment_does_not_read_are_refused(name: str, tmp_path: Path) -> None:
     said = refused(name, "--runs", "1", "--maps", str(tmp_path))

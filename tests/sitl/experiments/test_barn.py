@@ -150,6 +150,8 @@ def test_planned_motions_lead_through_narrow_ground() -> None:
 
     other = BarnReport(Options(1), (world,), {(Setup.STRICT, "motion-ga"): (one,)})
     assert other.section_name == "barn-strict" and "(BARN): strict" in other.section()
+    read = replace(other, options=replace(other.options, lidar="RPLIDAR-A1"))
+    assert read.section_name == "barn-strict-rplidar-a1" and "(BARN): strict and RPLIDAR-A1" in read.section()
     alone = BarnReport(Options(1), (world,), {(Setup.GUARDED, "motion-ga"): (one,)})
     assert alone.section_name == "barn-motion-ga" and "(BARN): motion-ga" in alone.section()
     assert list(other.pictures()) == ["barn-strict-worst"] and "images/barn-strict-worst.png" in other.section()
