@@ -36,3 +36,6 @@ class Mark(IntFlag):
     """The announcement of a command was in the saved state, or there is no saved state: it may go out."""
     LIDAR = 2048
     """Bytes of a lidar that is wired to the companion were heard; they stand in a file of their own."""
+    TERMINATED = 4096
+    """Beside ``STOP``: the request came from a signal that is no Ctrl-C. A record that is not closed says it nowhere
+    else."""

@@ -90,8 +90,9 @@ class RecordPlayer:
 
     @property
     def stopped_by(self) -> EndReason:
-        """What asked the run to stop, where its ticks say that something did."""
-        return self._record.meta.end_reason or EndReason.STOPPED_BY_USER
+        """What asked the run to stop, where the next tick says that something did."""
+        by_signal = self._next is not None and bool(self._next.entry.marks & Mark.TERMINATED)
+        return self._record.meta.end_reason or (EndReason.TERMINATED if by_signal else EndReason.STOPPED_BY_USER)
 
     def advance(self) -> None:
         """Go to the next tick. Raises EndOfRecordError."""
@@ -163,8 +164,8 @@ class RecordPlayer:
         """It is in the record."""
 
     def mark(self, mark: Mark) -> None:
-        """The recorded tick must have this mark."""
-        if not self.entry.marks & mark:
+        """The recorded tick must have this mark, but for one that older records lack."""
+        if not self.entry.marks & mark and mark is not Mark.TERMINATED:
             self.differs(f"{mark.name} in this tick, not so in the run")
 
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:

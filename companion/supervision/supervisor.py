@@ -68,6 +68,8 @@ class Supervisor:
             monitor.tick(now_s)
         if self._stop_asked is not None and self._run.end is None:
             self._log.mark(Mark.STOP)
+            if self._stop_asked is EndReason.TERMINATED:
+                self._log.mark(Mark.TERMINATED)
             figures = (str(self._run.activity),) if self._stop_asked is EndReason.NEVER_BEGINS else ()
             self._shutdown.begin(Reason(self._stop_asked, figures), now_s)
         if self._run.end is not None:

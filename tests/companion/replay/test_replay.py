@@ -12,6 +12,7 @@ from companion.core.tick_marks import Mark
 from companion.recording.reader import load_record
 from companion.recording.record_format import packed_tick, unpacked_ticks
 from companion.replay.replay import EndOfRecordError, RecordPlayer, ReplayStepRunner, replay
+from companion.safety.reasons import EndReason
 from tests.support.mavlink_vehicle import Station
 from tests.support.records import DECISION, TICKS, unclosed, write_record
 from tests.support.shared_data import SHARED, needs_shared
@@ -97,6 +98,22 @@ def test_a_mark_that_the_run_did_not_have_is_told(player: RecordPlayer) -> None:
     player.mark(Mark.UNSAVED)
     (difference,) = player.result.differences
     assert "UNSAVED" in difference
+
+
+def test_who_ended_a_run_is_known_also_where_its_record_was_not_closed(tmp_path: Path) -> None:
+    record = write_record(tmp_path)
+    ticks, _ = unpacked_ticks((record / "rounds.bin").read_bytes())
+    marks = {1: Mark.STOP, 2: Mark.STOP | Mark.TERMINATED}
+    changed = [entry._replace(marks=entry.marks | marks.get(number, 0)) for number, entry in enumerate(ticks)]
+    (record / "rounds.bin").write_bytes(b"".join(packed_tick(entry) for entry in changed))
+    unclosed(record)
+    player = RecordPlayer(load_record(record), lambda *_: None)
+    player.advance()
+    assert player.stopped_by is EndReason.STOPPED_BY_USER
+    player.advance()
+    assert player.stopped_by is EndReason.TERMINATED
+    player.mark(Mark.TERMINATED)
+    assert player.result.differences == [], "older records lack this mark"
 
 
 def test_an_answer_is_taken_in_the_round_in_which_the_run_took_it(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from companion.core.tick_marks import Mark
 from companion.safety.reasons import EndReason, Reason
 from companion.supervision.supervisor import SILENT
@@ -25,6 +27,15 @@ def test_a_stop_ends_the_run_in_hold(whole: Whole) -> None:
     whole.mode = int(HOLD)
     assert whole.tick() == [] and whole.companion.done and whole.memory.notes[-1]
     assert whole.companion.status().doing == "stopped by the user" and not whole.companion.outcome.complete
+
+
+@pytest.mark.parametrize("why", [EndReason.STOPPED_BY_USER, EndReason.TERMINATED])
+def test_the_record_is_told_whether_a_signal_ended_the_run(whole: Whole, why: EndReason) -> None:
+    whole.drive()
+    whole.companion.stop(why)
+    whole.tick()
+    assert whole.companion.mission_run.end == Reason(why)
+    assert (Mark.TERMINATED in whole.log.marks) is (why is EndReason.TERMINATED)
 
 
 def test_an_error_ends_the_run_in_hold_before_close_returns(whole: Whole) -> None:
