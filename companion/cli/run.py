@@ -30,6 +30,7 @@ from companion.cli.state import RunState, StateFiles
 from companion.cli.stop_signals import StopSignals
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
+from companion.core.heap import return_large_blocks
 from companion.core.severity import Severity
 from companion.executive.warm_up import COMPILING, kernels_warm, settle, warm_up
 from companion.lidar.reader import Lidars, lidars_on
@@ -199,6 +200,7 @@ def _opened(source: Source, say: Callable[[str], None], ends: contextlib.ExitSta
 
 
 def _load_planner(settings: Settings, mission: Mission, say: Callable[[str], None]) -> None:
+    return_large_blocks()  # its maps may be large, and the computer small
     if not kernels_warm(settings, mission.rover.turning_radius_m):
         say(COMPILING)
         warm_up(settings, mission.rover.turning_radius_m)

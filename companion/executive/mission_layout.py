@@ -43,8 +43,8 @@ class MissionLayout(MissionPlaces):
 
     start: ResolvedTarget
     """Where the rover was when the mission began: it returns there when it has to."""
-    ground: Grid
-    """What was known of it beforehand; obstacles have their own size there."""
+    obstacles: NDArray[np.bool_]
+    """Those that were known beforehand, in fields; they have their own size."""
     evidence: EvidenceMap
     fence: AutopilotFence
     refused: Mapping[int, str]
@@ -70,7 +70,7 @@ def lay(
     resolved, evidence = _laid(mission, settings, LocalFrame(origin), home, fence, narrow_sight)
     start = _start(pose.point, resolved.ground)
     return MissionLayout(
-        origin, home, resolved.targets, resolved.bounds, start, resolved.ground, evidence, fence, resolved.refused
+        origin, home, resolved.targets, resolved.bounds, start, _obstacles(resolved), evidence, fence, resolved.refused
     )
 
 
@@ -94,7 +94,7 @@ def lay_again(
         point = frame.to_ned(before.to_geo(requested.point))
         requested = replace(requested, point=point, cell=resolved.ground.cell_at(point))
     again = replace(
-        layout, origin=origin, targets=resolved.targets, start=start, ground=resolved.ground, evidence=evidence,
+        layout, origin=origin, targets=resolved.targets, start=start, obstacles=_obstacles(resolved), evidence=evidence,
         bounds=resolved.bounds, refused=resolved.refused,
     )  # fmt: skip
     commands = carried_commands(progress.commands, lambda point: frame.to_ned(before.to_geo(point)))
@@ -128,7 +128,7 @@ def seen_ground(layout: MissionLayout) -> tuple[Grid, NDArray[np.bool_]]:
     Obstacles have their own size: whoever reads the map adds the rover's radius. Fences are the mission's.
     """
     evidence, corner = layout.evidence, from_home(layout)
-    obstacles = occupied_fields(evidence) | (layout.ground.weights >= OBSTACLE)
+    obstacles = occupied_fields(evidence) | layout.obstacles
     known = known_fields(evidence) | obstacles
     rows, columns = (np.flatnonzero(known.any(axis=axis)) for axis in (1, 0))
     kept = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if len(rows) else np.s_[:, :]
@@ -142,6 +142,11 @@ def seen_ground(layout: MissionLayout) -> tuple[Grid, NDArray[np.bool_]]:
 def apart_m(here: GeoPoint, there: GeoPoint) -> float:
     """Metres between two places that are near each other."""
     return LocalFrame(here).to_ned(there).distance_m(NedPoint(0.0, 0.0))
+
+
+def _obstacles(resolved: ResolvedMission) -> NDArray[np.bool_]:
+    known: NDArray[np.bool_] = resolved.ground.weights >= OBSTACLE
+    return known
 
 
 def _start(point: NedPoint, grid: Grid) -> ResolvedTarget:

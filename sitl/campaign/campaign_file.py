@@ -86,6 +86,7 @@ class CampaignTable(BaseModel):
     off_model: list[Share] = Field(default=[0.0], min_length=1)
     late_s: list[Seconds] = Field(default=[0.0], min_length=1)
     time_limit_s: float = Field(default=1800.0, gt=0.0, le=36000.0)
+    person: bool = False
     settings: dict[str, dict[str, Any]] = Field(default={SHIPPED: {}}, min_length=1)
     search: SearchTable = SearchTable()
 

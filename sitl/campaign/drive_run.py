@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
+from companion.app import Status
 from companion.core.clock import processor_s
 from companion.core.interrupts import is_interrupt
 from companion.executive.mission_progress import TargetStatus
@@ -27,9 +29,10 @@ from sitl.campaign.wire_watch import WireWatch
 from sitl.campaign.worded import BLIND, NOTHING, OWN, GroundSpec, SensorSpec, faults_of
 from sitl.experiments.experiment import GUARD
 from sitl.experiments.off_model import off_model
+from sitl.experiments.person import Person
 from sitl.experiments.time_bound import time_bound_s
 from sitl.generators.made_ground import MadeGround, NoWayError, made
-from sitl.lockstep import Drive, TrackPoint
+from sitl.lockstep import Drive, Report, TrackPoint
 from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_faults, with_sensors
 from sitl.simulator import ROOM_REACH_M
 from sitl.world.movers import Mover
@@ -100,12 +103,12 @@ def drive(spec: RunSpec, folder: Path) -> RunResult:
         run, verdicts = prepared(spec, folder), Verdicts()
         targets = len(run.mission.targets)
         watch, near = WireWatch(run), Nearest(run)
-        run.run(lambda status: verdicts.look(run), LOOK_S)
+        _, helped = driven(run, spec, lambda: verdicts.look(run))
         blind_s = watch.blind_s if spec.off_model <= MOST_OFF else 0.0
         ground = _ground_of(spec.world, spec.seed)
         result = _result(run, near, watch.against_pilot, blind_s, verdicts.wrong(run))
         difficulty = None if ground is None else ground.difficulty
-        return replace(result, cpu_s=round(processor_s() - began_s, 2), ground=difficulty)
+        return replace(result, helped=helped, cpu_s=round(processor_s() - began_s, 2), ground=difficulty)
     except NoWayError as error:
         return RunResult("", NO_GROUND, cpu_s=processor_s() - began_s, said=str(error)[:300])
     except Exception as error:
@@ -122,6 +125,18 @@ def prepared(spec: RunSpec, folder: Path, recorder: Recorder | NullRecorder | No
     return Drive(
         mission, scenario, settings, spec.seed, recorder or NullRecorder(), spec.time_limit_s, late_s=spec.late_s
     )
+
+
+def driven(run: Drive, spec: RunSpec, look: Callable[[], None] = lambda: None) -> tuple[Report, int]:
+    """Drive a prepared run to its end; ``look`` is called every ``LOOK_S``. Returns how often a person helped, too."""
+    person = Person()
+
+    def observe(status: Status) -> None:
+        look()
+        if spec.person:
+            person.look(run, status.activity)
+
+    return run.run(observe, LOOK_S), person.helped
 
 
 def settings_of(spec: RunSpec) -> Settings:

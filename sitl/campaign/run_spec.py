@@ -34,6 +34,8 @@ class RunSpec:
     """The name of the variant."""
     seed: int
     time_limit_s: float
+    person: bool
+    """Whether somebody sets GUIDED and arms where the companion waits for that."""
     changes: str
     """The variant's values, as JSON."""
 
@@ -87,6 +89,8 @@ class RunResult:
     """So long it moved on without range data and did not brake as it must."""
     waits_for: str = ""
     """What it waited for at its end; empty if it waited for nothing."""
+    helped: int = 0
+    """How often a person set GUIDED and armed."""
     steps: int = 0
     searches: int = 0
     genetic_searches: int = 0
@@ -117,5 +121,5 @@ def specs_of(campaign: CampaignTable) -> Iterator[RunSpec]:
             changes = json.dumps(campaign.settings[settings], sort_keys=True)
             yield RunSpec(
                 world, planner, controller, sensors, faults, guard, off_model, late_s, settings, seed,
-                campaign.time_limit_s, changes,
+                campaign.time_limit_s, campaign.person, changes,
             )  # fmt: skip

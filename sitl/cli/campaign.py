@@ -18,7 +18,7 @@ from companion.recording.record_format import RecordError
 from companion.recording.recorder import Recorder
 from companion.safety.reasons import EndReason
 from sitl.campaign.campaign_file import CampaignError, load_campaign
-from sitl.campaign.drive_run import mission_of, prepared, settings_of
+from sitl.campaign.drive_run import driven, mission_of, prepared, settings_of
 from sitl.campaign.page_parts import number_of
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunSpec, specs_of
@@ -211,7 +211,7 @@ def _drive_again(file: Path, run_id: str | None, record: Path | None, goal: Goal
     ended_by: EndReason | None = None
     try:
         drive = prepared(spec, folder, recorder)
-        report = drive.run()
+        report, _ = driven(drive, spec)
         ended_by = drive.ended_by(EndReason.TIME_LIMIT)
     except Exception as error:
         if is_interrupt(error):

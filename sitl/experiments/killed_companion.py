@@ -39,8 +39,8 @@ from sitl.experiments.experiment import (
     section_by_rule,
 )
 from sitl.experiments.off_model import scenario_off_model, taken_for
+from sitl.experiments.person import Person
 from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table
-from sitl.experiments.soak import Person
 from sitl.lockstep import Drive
 from sitl.world.truth import STOOD_M_S
 

@@ -21,13 +21,11 @@ from rich.table import Table
 
 from companion.executive.mission_progress import TargetStatus
 from companion.recording.recorder import NullRecorder
-from companion.safety.reasons import Activity
 from companion.settings import Settings
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
-from sitl.autopilot.modes import arm, arming_faults, set_mode
-from sitl.autopilot.state import Mode
 from sitl.experiments import soak_faults, soak_worlds
 from sitl.experiments.experiment import Advance, ExperimentReport, Options, each, where_measured
+from sitl.experiments.person import PERSON_S, Person
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.scenario import SOMEWHERE, Scenario
@@ -36,10 +34,6 @@ from sitl.world.truth import SimStart
 NAME = "soak"
 SUITES = ("lidar-90", "lidar-360")
 TIME_LIMIT_S = 1800.0
-PERSON_S = 8.0
-"""So long the person looks before doing what the companion waits for."""
-PATIENCE = 5
-"""So often in a row the person tries."""
 GROWTH_MB = 20.0
 """More than this is growth: what the interpreter keeps for later varies by some megabytes."""
 WARM_UP = 10
@@ -85,37 +79,6 @@ class Soaked:
     time_s: float = 0.0
     memory_mb: float = 0.0
     """Of the process, after it."""
-
-
-class Person:
-    """Looks on; helps when asked to for long enough. ``gave_up``: why the rover was carried home, if it was."""
-
-    def __init__(self) -> None:
-        self.helped = 0
-        self.gave_up = ""
-        self._asked_s: float | None = None
-        self._in_vain = 0
-
-    def look(self, drive: Drive, activity: Activity) -> None:
-        """To be called often."""
-        now_s = drive.simulator.time_s
-        if not activity.needs_person:
-            self._asked_s = None
-            return
-        self._asked_s = now_s if self._asked_s is None else self._asked_s
-        if now_s - self._asked_s < PERSON_S:
-            return
-        vehicle = drive.simulator.vehicle
-        self._asked_s = None
-        self.helped += 1
-        if set_mode(vehicle, Mode.GUIDED) and arm(vehicle):
-            self._in_vain = 0
-            return
-        self._in_vain += 1
-        if self._in_vain == PATIENCE:
-            faults = "; ".join(fault.text for fault in arming_faults(vehicle))
-            self.gave_up = faults or "GUIDED refused"
-            drive.companion.stop()
 
 
 def soaked(seed: int) -> Soaked:

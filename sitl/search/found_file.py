@@ -46,6 +46,7 @@ def write_find(find: Find, spec: RunSpec, file: Path, command: str) -> None:
         f"off_model = [{json.dumps(spec.off_model)}]",
         f"late_s = [{json.dumps(spec.late_s)}]",
         f"time_limit_s = {json.dumps(spec.time_limit_s)}",
+        f"person = {json.dumps(spec.person)}",
         *_settings(spec),
     ]
     file.parent.mkdir(parents=True, exist_ok=True)

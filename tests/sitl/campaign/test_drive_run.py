@@ -17,7 +17,7 @@ from sitl.generators.measures import Difficulty
 from sitl.lockstep import Drive, TrackPoint
 from sitl.scenario import ScenarioError
 
-SPEC = RunSpec("maze", "hybrid", "points", "own", "none", False, 0.0, 0.0, "shipped", 1, 100.0, "{}")
+SPEC = RunSpec("maze", "hybrid", "points", "own", "none", False, 0.0, 0.0, "shipped", 1, 100.0, False, "{}")
 
 
 def test_an_error_of_the_programs_is_a_result(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,8 +83,17 @@ def test_the_bound_of_a_run_is_that_of_its_own_ground(tmp_path: Path) -> None:
     assert bounds_s == pytest.approx([30.0 / cruise_m_s] * 2, abs=0.05)
 
 
+def test_a_person_sets_guided_again_where_the_companion_waits_for_that(tmp_path: Path) -> None:
+    (tmp_path / "near.toml").write_text("[[target]]\nnorth_m = 6.0\neast_m = 0.0\n[sitl]\nsensors = 'lidar-90'\n")
+    lost = "link_outage start_s=0.5 duration_s=1 since=driving"
+    spec = replace(SPEC, world="near.toml", faults=lost, guard=True, time_limit_s=80.0)
+    alone, helped = drive(spec, tmp_path), drive(replace(spec, person=True), tmp_path)
+    assert (alone.outcome, alone.helped) == ("time limit", 0) and alone.waits_for.startswith("a person to set GUIDED")
+    assert (helped.outcome, helped.helped, helped.waits_for, helped.against_pilot) == ("reached", 1, "", 0)
+
+
 def test_settings_of_a_run_have_its_planner_its_controller_and_its_variant() -> None:
-    spec = RunSpec("maze", "astar", "motion-ga", "own", "none", True, 0.0, 0.0, "wide", 1, 100.0,
+    spec = RunSpec("maze", "astar", "motion-ga", "own", "none", True, 0.0, 0.0, "wide", 1, 100.0, False,
                    '{"guidance": {"clearance_m": 0.4}}')  # fmt: skip
     settings = drive_run.settings_of(spec)
     assert settings.navigator.planner == "astar" and settings.guidance.controller == "motion-ga"

@@ -99,7 +99,9 @@ MUTANTS: list[tuple[Callable[[Patch], None], str, Policy]] = [
 def driven(folder: Path, faults: str, sensors: str = "lidar-360") -> RunResult:
     (folder / "world.toml").write_text(WORLD)
     (folder / "mission.toml").write_text(MISSION)
-    spec = RunSpec("mission.toml", "hybrid", "points", sensors, faults, False, 0.0, 0.0, "shipped", 1, 75.0, "{}")
+    spec = RunSpec(
+        "mission.toml", "hybrid", "points", sensors, faults, False, 0.0, 0.0, "shipped", 1, 75.0, False, "{}"
+    )
     return drive(spec, folder)
 
 

@@ -7,11 +7,9 @@ import pytest
 
 from companion.core.grid import OBSTACLE, inflated
 from companion.mission.check import check_mission
-from companion.safety.reasons import Activity, Reason, RunPhase, WaitReason
-from sitl.autopilot.state import Mode
 from sitl.experiments import soak, soak_faults
 from sitl.experiments.experiment import Options
-from sitl.experiments.soak import Ended, Person, Soaked, SoakReport, soaked
+from sitl.experiments.soak import Ended, Soaked, SoakReport, soaked
 from sitl.experiments.soak_worlds import FINE_M, ROOM_M, drawn, mission_on
 
 
@@ -54,34 +52,6 @@ def test_faults_are_of_every_kind_and_come_while_it_drives() -> None:
     assert len(kinds) == len(soak_faults.FAULTS)
     assert all(fault.since == "driving" and fault.end_s > fault.start_s for fault in faults)
     assert plans[7] == soak_faults.plan_of(np.random.default_rng(7))
-
-
-DISARMED = Activity(RunPhase.STOPPED_AND_WAITING, awaited=Reason(WaitReason.PERSON_ARMS_AGAIN))
-
-
-class Vehicle:
-    """What the person sees of a run."""
-
-    def __init__(self) -> None:
-        self.simulator = self
-        self.time_s = 0.0
-        self.vehicle = "the vehicle"
-
-
-def test_the_person_helps_when_asked_for_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    modes, armed = [], []
-    monkeypatch.setattr(soak, "set_mode", lambda vehicle, mode: modes.append(mode) or True)
-    monkeypatch.setattr(soak, "arm", lambda vehicle: armed.append(vehicle) or True)
-    person, run = Person(), Vehicle()
-    for run.time_s in np.arange(0.0, 7.5, 0.5):
-        person.look(run, DISARMED)  # type: ignore[arg-type]
-    person.look(run, Activity(RunPhase.DRIVING))  # type: ignore[arg-type]
-    for run.time_s in np.arange(8.0, 15.5, 0.5):
-        person.look(run, DISARMED)  # type: ignore[arg-type]
-    assert (person.helped, modes, armed) == (0, [], [])
-    run.time_s = 16.0
-    person.look(run, DISARMED)  # type: ignore[arg-type]
-    assert (person.helped, modes, armed) == (1, [Mode.GUIDED], ["the vehicle"])
 
 
 @pytest.mark.thorough

@@ -57,7 +57,7 @@ def test_a_thin_wall_is_no_gap_wherever_it_stands(first: int) -> None:
 
 def test_generated_ground_always_has_one() -> None:
     for kind in ("maze", "yard"):
-        spec = RunSpec(kind, "hybrid", "points", "own", "none", False, 0.0, 0.0, "shipped", 1, 100.0, "{}")
+        spec = RunSpec(kind, "hybrid", "points", "own", "none", False, 0.0, 0.0, "shipped", 1, 100.0, False, "{}")
         mission = mission_of(spec, Path())
         goal = mission.targets[0].place
         ground = made(GroundKind(kind), 1)
