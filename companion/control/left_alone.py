@@ -37,7 +37,8 @@ NEARER_M, NEARER_UNSEEN_M = 0.05, 0.1
 cells make ways differ by as much."""
 AWAY_M, AWAY = 0.02, 0.1
 """A rover whose outline lies deeper over something may get so much deeper, so that it gets away; but with each metre it
-must get out of it by the second."""
+must get out of it by the second. Where nothing is planned but the way of a disc (``along``), it may lie as deep over
+anything: guidance lets a disc that stands beside something come nearer by a tenth of a cell."""
 UNDER_M, BESIDE = 0.3, 2.0
 """No sensor sees the ground on which the rover can turn and so much round it, nor what lies that many times its half
 width beside it."""
@@ -338,7 +339,7 @@ def passes(way, disc, away, evidence):
         if unseen_m > 0.5 * cell_m and seen == count:
             seen = at - int(round(unseen_m / PIECE_M))  # a corner of a cell alone does not count
         deep_m, _ = _deepest(place, disc, way[0], math.inf, evidence)
-        if deep_m > max(begins_m + AWAY_M - away * gone_m, 0.0):
+        if deep_m > max(begins_m - away * gone_m, 0.0) + AWAY_M:
             return at, seen
         if gone_m > corner_m and _is_deep_in_closed(place, evidence, True):
             return at, seen

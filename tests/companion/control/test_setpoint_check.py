@@ -291,6 +291,17 @@ def test_a_rover_at_a_wall_may_leave_it() -> None:
     assert fault(Output(GuidedVelocity(0.5, 0.0), Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), evidence) is None
 
 
+@pytest.mark.parametrize(("deep_m", "kind"), [(0.012, None), (0.03, SetpointFault.BEHIND_OBSTACLE)])
+def test_a_position_may_lead_past_a_thing_as_near_as_guidance_does(deep_m: float, kind: SetpointFault | None) -> None:
+    """Guidance comes nearer than its radius by a tenth of a cell, where it stands beside something already."""
+    evidence = open_ground()
+    side_m = evidence.evidence_m
+    y, x = (int((MIDDLE + off_m) / side_m) for off_m in (1.0, 0.3))
+    evidence.log_odds[y, x] = 3.0
+    pose = Pose(MIDDLE, (x + 0.5) * side_m - (RADIUS_M + 0.5 * side_m - deep_m), 0.0, 0.0)
+    assert fault(Output(GuidedPosition(NedPoint(MIDDLE + 2.0, pose.east_m)), pose, 0.0), evidence) is kind
+
+
 def test_a_target_at_the_farthest_distance_passes() -> None:
     for beyond_m, refused in ((0.0, False), (0.2, True)):
         pose = Pose(0.5, MIDDLE, 0.0, 0.0)
