@@ -6,6 +6,7 @@ Nouns: warm-up.
 from __future__ import annotations
 
 import gc
+from dataclasses import replace
 
 import numpy as np
 from numba.core import event
@@ -32,6 +33,7 @@ from companion.mapping.map_edits import move
 from companion.mapping.map_queries import clearance_m, look_along, unseen_beside
 from companion.mission.bounds import Bounds
 from companion.perception.object_tracker import ObjectTracker
+from companion.perception.range_age import FEW, RangeAges
 from companion.planning import registry
 from companion.settings import Settings
 from companion.settings.settings_file import by_points
@@ -59,6 +61,7 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     view = RangeScan(0.0, np.linspace(-0.5, 0.5, 8), np.full(8, 2.0), 0.2, 4.0, 0.02, "warm-up")
     ObjectTracker(evidence).take(Pose(4.0, 4.0, 0.0, 0.0), 0.0, view)
     places = np.zeros((2, 2))
+    _age_of_ranges(view)
     least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]))
     steered(0.0, 0.0, 0.0, places, np.zeros(2), np.zeros(1))
     first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
@@ -69,6 +72,13 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
         _steer(by_points(settings))
     if settings.guidance.controller != "points":
         _plan_motions(settings)
+
+
+def _age_of_ranges(view: RangeScan) -> None:
+    """Two scans, of a rover that begins to turn."""
+    ages, far = RangeAges(), replace(view, bearing_rad=np.linspace(-0.5, 0.5, FEW), range_m=np.full(FEW, 2.0))
+    ages.note(far, Pose(4.0, 4.0, 0.0, 0.0), 0.0, 0.0)
+    ages.note(far, Pose(4.0, 4.0, 0.0, 1.0), 0.0, 1.0)
 
 
 def _plan_motions(settings: Settings) -> None:

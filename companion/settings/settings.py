@@ -96,6 +96,13 @@ class MappingSettings(Section):
     soft_cost: float = Field(0.4, ge=0.0, lt=0.5, description="weight added beside obstacles")
     soft_reach_m: float = Field(2.0, ge=0.0, description="how far from an obstacle the soft cost reaches")
     max_yaw_rate_deg_s: float = Field(120.0, gt=0.0, description="scans taken while turning faster are dropped")
+    range_age_s: float | None = Field(
+        None,
+        ge=0.0,
+        le=1.0,
+        description="so much older than positions are ranges over MAVLink when they come; without it that is found "
+        "while the rover turns, from 0.05 s on. Of a lidar that the companion reads itself it is known",
+    )
 
 
 CONTROLLERS = ("points", "motion-ga", "dwa", "mppi")

@@ -81,7 +81,7 @@ def assemble(
     handlers: tuple[EventHandler, ...]
     handlers = (operator_server, *monitors.by_precedence, *requests, run, permission)
     heard = Heard(autopilot, options.lidars)
-    dispatcher = EventDispatcher(run, heard, notifier, handlers, monitors.scans, monitors.localization)
+    dispatcher = EventDispatcher(run, heard, notifier, handlers, monitors.scans, monitors.localization, live)
 
     limits = MissionLimits(
         run, monitors.fences, monitors.batteries, monitors.rivals, monitors.gate, settings.power, outcome

@@ -8,15 +8,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
-from companion.core.scan import WIRED
+import numpy as np
+
+from companion.core.scan import WIRED, RangeScan
 from companion.core.severity import Severity
 from companion.executive.mission_run import LocatedScan, MissionRun
 from companion.lidar.reader import Lidars
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.operator.notifications import Notifier
 from companion.perception.deskew import deskewed
+from companion.perception.range_age import RangeAges
 from companion.perception.scan_filter import NEAREST_OF_ALL, newest_ranges
 from companion.safety.watchdogs import ScanMonitor
+from companion.settings.live_settings import LiveSettings
 from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.vehicle.events import Event, RangeSeen, TextSeen
 from companion.vehicle.state import VehicleState, fold
@@ -60,6 +64,7 @@ class EventDispatcher:
         handlers: tuple[EventHandler, ...],
         scans: ScanMonitor,
         localization: LocalizationMonitor,
+        settings: LiveSettings,
     ) -> None:
         self._run = run
         self._heard = heard
@@ -67,6 +72,9 @@ class EventDispatcher:
         self._handlers = handlers
         self._scans = scans
         self._localization = localization
+        self._settings = settings
+        self._ages = RangeAges()
+        self._told: set[tuple[int, str]] = set()
 
     def listen(self, now_s: float) -> list[LocatedScan]:
         """Dispatch everything that has come in since the last tick; return the scans that may go on the map."""
@@ -90,13 +98,15 @@ class EventDispatcher:
     def _located(self, event: RangeSeen, now_s: float) -> LocatedScan | None:
         """The scan where it was taken; None when that is doubtful.
 
-        One whose readings have ages is brought to the rover's place of now, any other was taken as it came. The
-        position comes over the link, and is half a round trip old when it does. What comes over the same link is as
-        late, and a lidar of the companion's own is not.
+        One whose readings have ages is brought to the rover's place of now. Over MAVLink they have the age of the
+        settings, or that which was found; with none they were taken as they came. The position comes over the link,
+        and is half a round trip old when it does. What comes over the same link is as late, and a lidar of the
+        companion's own is not.
         """
         if not self._scans.fits or self._localization.position_doubted:
             return None
-        vehicle, scan, at_s = self._run.vehicle, event.scan, event.time_s
+        vehicle, at_s = self._run.vehicle, event.time_s
+        scan = _of_age(event.scan, self._age_s(event))
         if scan.age_s is not None:
             scan, at_s = replace(scan, age_s=scan.age_s + (now_s - event.time_s)), now_s
         if scan.sender == WIRED:
@@ -106,3 +116,25 @@ class EventDispatcher:
             return None
         rate_rad_s = attitude.yaw_rate_rad_s
         return LocatedScan(pose, rate_rad_s, deskewed(scan, vehicle.forward_m_s, rate_rad_s))
+
+    def _age_s(self, event: RangeSeen) -> float:
+        """How old the ranges are, over MAVLink; told once of each sensor."""
+        set_s = self._settings.current.mapping.range_age_s
+        if set_s is not None:
+            return set_s
+        vehicle, scan = self._run.vehicle, event.scan
+        pose = vehicle.pose_at(event.time_s)
+        if pose is not None and vehicle.attitude is not None:
+            self._ages.note(scan, pose, vehicle.forward_m_s, vehicle.attitude.yaw_rate_rad_s)
+        age_s = self._ages.age_s(scan)
+        if age_s > 0.0 and scan.voice not in self._told:
+            self._told.add(scan.voice)
+            self._notifier.tell(f"Ranges ({scan.source}) are {age_s:.2f} s older than positions", Severity.NOTICE)
+        return age_s
+
+
+def _of_age(scan: RangeScan, age_s: float) -> RangeScan:
+    """The scan with this age for all readings, unless it knows their ages itself, or they have none."""
+    if age_s == 0.0 or scan.age_s is not None or scan.sender == WIRED:
+        return scan
+    return replace(scan, age_s=np.full(scan.range_m.shape, age_s))

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from companion.core.scan import WIRED
 from companion.core.severity import Severity
 from companion.executive.mission_run import LocatedScan
 from companion.operator.notifications import News
+from companion.settings import Settings
+from companion.settings.settings_file import parse_settings
 from companion.supervision.event_dispatcher import EventDispatcher
 from companion.vehicle.commands import (
     AnswerRequest,
@@ -25,6 +29,7 @@ from companion.vehicle.events import (
     RangeSeen,
     TextSeen,
 )
+from tests.companion.perception.test_range_age import scan_at, to_and_fro
 from tests.companion.safety.test_mode_latch import HOLD
 from tests.support.desk import Desk
 from tests.support.whole import Whole
@@ -42,15 +47,15 @@ def test_ground_stations_are_answered_and_the_autopilots_warnings_shown(whole: W
 class Heard:
     """A dispatcher with what it hands events to."""
 
-    def __init__(self, folder: Path, *, begun: bool = True) -> None:
-        self.desk, self.taken, self.noted = Desk(folder), [], []
+    def __init__(self, folder: Path, *, begun: bool = True, settings: Settings | None = None) -> None:
+        self.desk, self.taken, self.noted = Desk(folder, settings=settings), [], []
         self.scans, self.localization = SimpleNamespace(fits=True), SimpleNamespace(position_doubted=False)
         notifier: Any = SimpleNamespace(news=["old"], note=lambda text, severity: self.noted.append((text, severity)))
         one, other = (
             SimpleNamespace(take=lambda event, vehicle, name=name: self.taken.append(name)) for name in ("one", "other")
         )
         link: Any = self.desk.autopilot
-        parts: Any = ((one, other), self.scans, self.localization)
+        parts: Any = ((one, other), self.scans, self.localization, self.desk.settings)
         self.dispatcher, self.notifier = EventDispatcher(self.desk.run, link, notifier, *parts), notifier
         if begun:
             self.desk.begin()
@@ -104,3 +109,53 @@ def test_a_scan_of_a_wired_lidar_lies_before_the_position_that_came_late_over_th
     )
     (found,) = heard.listen(RangeSeen(now_s, replace(seen.scan.scan, time_s=now_s, sender=sender)))
     assert found.pose.north_m == pytest.approx(2.2 if sender == WIRED else 2.0)
+
+
+@pytest.mark.parametrize(("sender", "told_s", "age_s"), [(1, 0.2, 0.2), (1, 0.0, 0.0), (WIRED, 0.2, 0.0)])
+def test_ranges_over_the_link_lie_where_the_rover_was_before_as_long_as_they_are_old(
+    tmp_path: Path, sender: int, told_s: float, age_s: float
+) -> None:
+    """A rover that turns at 1 rad/s and rolls at 1 m/s: something 4 m ahead 0.2 s ago lies to the left, and nearer."""
+    heard = Heard(tmp_path, settings=parse_settings({"mapping": {"range_age_s": told_s}}, "here"))
+    seen = heard.desk.stand(2.0, 3.0)
+    now_s = heard.desk.now_s
+    assert seen.scan is not None and seen.position is not None and seen.attitude is not None
+    turning = replace(seen.attitude, time_s=now_s, heading_rad=0.0, yaw_rate_rad_s=1.0)
+    heard.desk.run.vehicle = replace(
+        seen, attitude=turning, position=replace(seen.position, time_s=now_s, north_m_s=1.0, east_m_s=0.0)
+    )
+    ahead = replace(seen.scan.scan, time_s=now_s, sender=sender, bearing_rad=np.array([0.0]), range_m=np.array([4.0]))
+    (found,) = heard.listen(RangeSeen(now_s, ahead))
+    bearing_rad, range_m = found.scan.bearing_rad[0], found.scan.range_m[0]
+    behind_m = np.array([math.sin(age_s), math.cos(age_s) - 1.0])  # of an arc of 1 m radius
+    there = 4.0 * np.array([math.cos(age_s), -math.sin(age_s)]) - behind_m
+    assert (range_m * math.cos(bearing_rad), range_m * math.sin(bearing_rad)) == pytest.approx(tuple(there), abs=1e-9)
+    assert (found.pose.north_m, found.scan.age_s) == (2.0, None)
+
+
+@pytest.mark.parametrize("told_s", [None, 0.0])
+def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
+    tmp_path: Path, told_s: float | None
+) -> None:
+    heard = Heard(
+        tmp_path, settings=parse_settings({"mapping": {"range_age_s": told_s}} if told_s == 0.0 else {}, "here")
+    )
+    told: list[str] = []
+    heard.notifier.tell = lambda text, severity: told.append(text)
+    seen = heard.desk.stand(0.0, 0.0)
+    assert seen.position is not None and seen.attitude is not None
+    bearings_rad = []
+    for time_s in heard.desk.now_s + np.arange(0.0, 6.0, 0.1):
+        heading_rad, rate_rad_s = to_and_fro(time_s)
+        heard.desk.run.vehicle = replace(
+            seen,
+            position=replace(seen.position, time_s=time_s, north_m_s=0.0, east_m_s=0.0),
+            attitude=replace(seen.attitude, time_s=time_s, heading_rad=heading_rad, yaw_rate_rad_s=rate_rad_s),
+        )
+        scan = replace(scan_at(time_s, to_and_fro(time_s - 0.2)[0], (0.0, 0.0)), time_s=time_s)
+        heard.desk.autopilot.events = [RangeSeen(time_s, scan)]
+        (found,) = heard.dispatcher.listen(time_s)
+        bearings_rad.append(found.scan.bearing_rad[0] / rate_rad_s)
+    assert bearings_rad[0] == 0.0 and bearings_rad[-1] == pytest.approx(0.0 if told_s == 0.0 else -0.2, abs=0.03)
+    assert len(told) == (0 if told_s == 0.0 else 1)
+    assert told_s == 0.0 or told[0].startswith("Ranges (OBSTACLE_DISTANCE) are 0.")

@@ -1,0 +1,164 @@
+"""Range age: how much older than positions ranges over MAVLink are, found from how they turn with the rover.
+
+A lidar needs a turn to measure and the autopilot a while to pass it on. What the rover sees while it turns lies aside
+by its turn rate times that age. So a scan is laid over one taken just before, when the rover turned at another rate,
+with each of some ages in turn: with the right one both lie on the same walls.
+
+Nouns: range age.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from companion.core.frames import Pose
+from companion.core.scan import WIRED, RangeScan
+
+Floats = NDArray[np.float64]
+
+STEP_S = 0.025
+AGES_S = np.arange(-2, 19) * STEP_S
+"""Those that are tried. Below 0 there are some so that an age of 0 has others on both sides."""
+NOW = 2
+"""The number of age 0."""
+LEAST_S = 0.05
+"""A younger scan lies where it was taken by a few centimetres."""
+OTHER_RAD_S = 0.3
+"""So much the turn rates of two scans differ at least, or their age does not show."""
+LASTS_S, NEAR_M = 3.0, 1.0
+"""A scan is compared with one of so long before at most, from so near: both see the same."""
+KEPT = 30
+"""Scans to compare with, of each sensor."""
+APART_S = 0.1
+"""Between comparisons: they take a tenth of a millisecond each."""
+SIGHT_M, FEW = 6.0, 12
+"""Readings up to there count, and so many there must be."""
+FAR_M = 0.4
+"""What lies farther from anything seen before is something else."""
+COUNT, MOST = 10, 400
+"""So many comparisons tell something; of more than so many the older ones count less and less."""
+BETTER_M = 0.015
+"""By so much better than with no age at all the scans must lie on each other, on average."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Look:
+    """Readings that hit something, and how the rover stood and moved when they came."""
+
+    pose: Pose
+    motion: tuple[float, float]
+    """Forward speed, m/s, and yaw rate, rad/s."""
+    bearing_rad: Floats
+    range_m: Floats
+
+
+@dataclass(eq=False, slots=True)
+class _Voice:
+    """What is known of one sensor."""
+
+    before: deque[_Look] = field(default_factory=lambda: deque(maxlen=KEPT))
+    compared_s: float = -math.inf
+    gaps_m: Floats = field(default_factory=lambda: np.zeros(len(AGES_S)))
+    count: float = 0.0
+    age_s: float = 0.0
+
+
+class RangeAges:
+    """Finds the age of the ranges of each sensor that sends views over MAVLink, and no ages of its own."""
+
+    def __init__(self) -> None:
+        self._voices: dict[tuple[int, str], _Voice] = {}
+
+    def age_s(self, scan: RangeScan) -> float:
+        """How old the scan was when it came; 0 as long as nothing else is known."""
+        voice = self._voices.get(scan.voice)
+        return 0.0 if voice is None else voice.age_s
+
+    def note(self, scan: RangeScan, pose: Pose, forward_m_s: float, yaw_rate_rad_s: float) -> None:
+        """One more scan, as it came. ``pose``, ``forward_m_s``, ``yaw_rate_rad_s``: of the rover when it came."""
+        hit = np.isfinite(scan.range_m) & (scan.range_m < SIGHT_M)
+        if scan.sender == WIRED or scan.age_s is not None or np.count_nonzero(hit) < FEW:
+            return
+        voice = self._voices.setdefault(scan.voice, _Voice())
+        look = _Look(pose, (forward_m_s, yaw_rate_rad_s), scan.bearing_rad[hit], scan.range_m[hit])
+        if pose.time_s - voice.compared_s >= APART_S and (other := _other(voice, look)) is not None:
+            _compare(voice, look, other)
+        voice.before.append(look)
+
+
+def _other(voice: _Voice, look: _Look) -> _Look | None:
+    """The scan that has seen the same a moment before, while the rover turned at the most different rate."""
+    here, rate_rad_s = look.pose, look.motion[1]
+    alike = (
+        one
+        for one in voice.before
+        if here.time_s - one.pose.time_s < LASTS_S and here.point.distance_m(one.pose.point) < NEAR_M
+    )
+    best = max(alike, key=lambda one: abs(one.motion[1] - rate_rad_s), default=None)
+    return None if best is None or abs(best.motion[1] - rate_rad_s) < OTHER_RAD_S else best
+
+
+def _compare(voice: _Voice, look: _Look, other: _Look) -> None:
+    voice.compared_s = look.pose.time_s
+    if voice.count >= MOST:
+        voice.count, voice.gaps_m = 0.5 * voice.count, 0.5 * voice.gaps_m
+    voice.count += 1.0
+    voice.gaps_m += mean_gaps_m(*_figures(look), *_figures(other), AGES_S)
+    if voice.count >= COUNT:
+        voice.age_s = _best_s(voice.gaps_m / voice.count)
+
+
+def _figures(look: _Look) -> tuple[tuple[float, float, float], tuple[float, float], Floats, Floats]:
+    pose = look.pose
+    return (pose.north_m, pose.east_m, pose.heading_rad), look.motion, look.bearing_rad, look.range_m
+
+
+def _best_s(gaps_m: Floats) -> float:
+    """The age with the least gap, between those that were tried; 0 where it is hardly better than none."""
+    at = int(gaps_m.argmin())
+    if not 0 < at < len(gaps_m) - 1 or gaps_m[NOW] - gaps_m[at] < BETTER_M:
+        return 0.0
+    before, least, after = gaps_m[at - 1 : at + 2]
+    bend = before - 2.0 * least + after
+    age_s = float(AGES_S[at] + (0.5 * (before - after) / bend * STEP_S if bend > 0.0 else 0.0))
+    return age_s if age_s >= LEAST_S else 0.0
+
+
+@njit(cache=True, nogil=True)
+def mean_gaps_m(pose, motion, bearing_rad, range_m, other_pose, other_motion, other_bearing_rad, other_range_m, ages_s):
+    """How far, on average, readings end from the nearest one of another scan, ``FAR_M`` at most, for each age."""
+    gaps = np.empty(ages_s.size)
+    ends, others = np.empty((range_m.size, 2)), np.empty((other_range_m.size, 2))
+    for nth in range(ages_s.size):
+        _lay(pose, motion, bearing_rad, range_m, ages_s[nth], ends)
+        _lay(other_pose, other_motion, other_bearing_rad, other_range_m, ages_s[nth], others)
+        total = 0.0
+        for i in range(ends.shape[0]):
+            least = FAR_M * FAR_M
+            for j in range(others.shape[0]):
+                north, east = ends[i, 0] - others[j, 0], ends[i, 1] - others[j, 1]
+                least = min(least, north * north + east * east)
+            total += math.sqrt(least)
+        gaps[nth] = total / ends.shape[0]
+    return gaps
+
+
+@njit(cache=True, nogil=True)
+def _lay(pose, motion, bearing_rad, range_m, age_s, ends):
+    """Where readings end, metres north and east, if they were taken so long before the rover was at this pose."""
+    forward_m_s, yaw_rate_rad_s = motion
+    middle_rad = pose[2] - 0.5 * yaw_rate_rad_s * age_s
+    north = pose[0] - forward_m_s * age_s * math.cos(middle_rad)
+    east = pose[1] - forward_m_s * age_s * math.sin(middle_rad)
+    for i in range(range_m.size):
+        course_rad = pose[2] - yaw_rate_rad_s * age_s + bearing_rad[i]
+        ends[i, 0] = north + range_m[i] * math.cos(course_rad)
+        ends[i, 1] = east + range_m[i] * math.sin(course_rad)
