@@ -21,11 +21,13 @@ from numpy.typing import NDArray
 
 from companion.core.frames import Pose
 from companion.core.scan import WIRED, RangeScan
+from companion.perception.past_headings import PastHeadings
+from companion.vehicle.events import AttitudeSeen
 
 Floats = NDArray[np.float64]
 
 STEP_S = 0.025
-AGES_S = np.arange(-2, 19) * STEP_S
+AGES_S: Floats = np.linspace(-0.05, 0.45, 21)
 """Those that are tried. Below 0 there are some so that an age of 0 has others on both sides."""
 NOW = 2
 """The number of age 0."""
@@ -54,8 +56,10 @@ class _Look:
     """Readings that hit something, and how the rover stood and moved when they came."""
 
     pose: Pose
-    motion: tuple[float, float]
-    """Forward speed, m/s, and yaw rate, rad/s."""
+    forward_m_s: float
+    yaw_rate_rad_s: float
+    turned_rad: Floats
+    """How far it had turned then since each of ``AGES_S`` before."""
     bearing_rad: Floats
     range_m: Floats
 
@@ -76,6 +80,11 @@ class RangeAges:
 
     def __init__(self) -> None:
         self._voices: dict[tuple[int, str], _Voice] = {}
+        self._headings = PastHeadings()
+
+    def hear(self, attitude: AttitudeSeen | None) -> None:
+        """The last attitude, after each event."""
+        self._headings.note(attitude)
 
     def age_s(self, scan: RangeScan) -> float:
         """How old the scan was when it came; 0 as long as nothing else is known."""
@@ -88,22 +97,29 @@ class RangeAges:
         if scan.sender == WIRED or scan.age_s is not None or np.count_nonzero(hit) < FEW:
             return
         voice = self._voices.setdefault(scan.voice, _Voice())
-        look = _Look(pose, (forward_m_s, yaw_rate_rad_s), scan.bearing_rad[hit], scan.range_m[hit])
+        turned_rad = self._headings.turned_rad(pose.time_s, AGES_S)
+        look = _Look(pose, forward_m_s, yaw_rate_rad_s, turned_rad, scan.bearing_rad[hit], scan.range_m[hit])
         if pose.time_s - voice.compared_s >= APART_S and (other := _other(voice, look)) is not None:
             _compare(voice, look, other)
         voice.before.append(look)
 
+    def before(self, pose: Pose, age_s: float, forward_m_s: float) -> Pose:
+        """Where the rover was so long before it was at ``pose``, with the speed that it has there."""
+        turned_rad = float(self._headings.turned_rad(pose.time_s, np.array([age_s]))[0])
+        place = pose.point.moved(pose.heading_rad - 0.5 * turned_rad, -forward_m_s * age_s)
+        return Pose(place.north_m, place.east_m, pose.heading_rad - turned_rad, pose.time_s - age_s)
+
 
 def _other(voice: _Voice, look: _Look) -> _Look | None:
     """The scan that has seen the same a moment before, while the rover turned at the most different rate."""
-    here, rate_rad_s = look.pose, look.motion[1]
+    here, rate_rad_s = look.pose, look.yaw_rate_rad_s
     alike = (
         one
         for one in voice.before
         if here.time_s - one.pose.time_s < LASTS_S and here.point.distance_m(one.pose.point) < NEAR_M
     )
-    best = max(alike, key=lambda one: abs(one.motion[1] - rate_rad_s), default=None)
-    return None if best is None or abs(best.motion[1] - rate_rad_s) < OTHER_RAD_S else best
+    best = max(alike, key=lambda one: abs(one.yaw_rate_rad_s - rate_rad_s), default=None)
+    return None if best is None or abs(best.yaw_rate_rad_s - rate_rad_s) < OTHER_RAD_S else best
 
 
 def _compare(voice: _Voice, look: _Look, other: _Look) -> None:
@@ -116,9 +132,10 @@ def _compare(voice: _Voice, look: _Look, other: _Look) -> None:
         voice.age_s = _best_s(voice.gaps_m / voice.count)
 
 
-def _figures(look: _Look) -> tuple[tuple[float, float, float], tuple[float, float], Floats, Floats]:
+def _figures(look: _Look) -> tuple[tuple[float, float, float], float, Floats, Floats, Floats]:
     pose = look.pose
-    return (pose.north_m, pose.east_m, pose.heading_rad), look.motion, look.bearing_rad, look.range_m
+    place = (pose.north_m, pose.east_m, pose.heading_rad)
+    return place, look.forward_m_s, look.turned_rad, look.bearing_rad, look.range_m
 
 
 def _best_s(gaps_m: Floats) -> float:
@@ -133,13 +150,18 @@ def _best_s(gaps_m: Floats) -> float:
 
 
 @njit(cache=True, nogil=True)
-def mean_gaps_m(pose, motion, bearing_rad, range_m, other_pose, other_motion, other_bearing_rad, other_range_m, ages_s):
+def mean_gaps_m(
+    pose, forward_m_s, turned_rad, bearing_rad, range_m,
+    other_pose, other_forward_m_s, other_turned_rad, other_bearing_rad, other_range_m, ages_s,
+):  # fmt: skip
     """How far, on average, readings end from the nearest one of another scan, ``FAR_M`` at most, for each age."""
     gaps = np.empty(ages_s.size)
     ends, others = np.empty((range_m.size, 2)), np.empty((other_range_m.size, 2))
     for nth in range(ages_s.size):
-        _lay(pose, motion, bearing_rad, range_m, ages_s[nth], ends)
-        _lay(other_pose, other_motion, other_bearing_rad, other_range_m, ages_s[nth], others)
+        _lay(pose, forward_m_s * ages_s[nth], turned_rad[nth], bearing_rad, range_m, ends)
+        _lay(
+            other_pose, other_forward_m_s * ages_s[nth], other_turned_rad[nth], other_bearing_rad, other_range_m, others
+        )
         total = 0.0
         for i in range(ends.shape[0]):
             least = FAR_M * FAR_M
@@ -152,13 +174,10 @@ def mean_gaps_m(pose, motion, bearing_rad, range_m, other_pose, other_motion, ot
 
 
 @njit(cache=True, nogil=True)
-def _lay(pose, motion, bearing_rad, range_m, age_s, ends):
-    """Where readings end, metres north and east, if they were taken so long before the rover was at this pose."""
-    forward_m_s, yaw_rate_rad_s = motion
-    middle_rad = pose[2] - 0.5 * yaw_rate_rad_s * age_s
-    north = pose[0] - forward_m_s * age_s * math.cos(middle_rad)
-    east = pose[1] - forward_m_s * age_s * math.sin(middle_rad)
+def _lay(pose, gone_m, turned_rad, bearing_rad, range_m, ends):
+    """Where readings end, metres north and east, that were taken before the rover came and turned by so much."""
+    middle_rad, heading_rad = pose[2] - 0.5 * turned_rad, pose[2] - turned_rad
+    north, east = pose[0] - gone_m * math.cos(middle_rad), pose[1] - gone_m * math.sin(middle_rad)
     for i in range(range_m.size):
-        course_rad = pose[2] - yaw_rate_rad_s * age_s + bearing_rad[i]
-        ends[i, 0] = north + range_m[i] * math.cos(course_rad)
-        ends[i, 1] = east + range_m[i] * math.sin(course_rad)
+        ends[i, 0] = north + range_m[i] * math.cos(heading_rad + bearing_rad[i])
+        ends[i, 1] = east + range_m[i] * math.sin(heading_rad + bearing_rad[i])

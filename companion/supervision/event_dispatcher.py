@@ -8,9 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
-import numpy as np
-
-from companion.core.scan import WIRED, RangeScan
+from companion.core.scan import WIRED
 from companion.core.severity import Severity
 from companion.executive.mission_run import LocatedScan, MissionRun
 from companion.lidar.reader import Lidars
@@ -82,6 +80,7 @@ class EventDispatcher:
         run, found = self._run, []
         for event in newest_ranges(self._heard.poll(now_s)):
             run.vehicle = fold(run.vehicle, event)
+            self._ages.hear(run.vehicle.attitude)
             self._note_text(event)
             for handler in self._handlers:
                 handler.take(event, run.vehicle)
@@ -98,15 +97,14 @@ class EventDispatcher:
     def _located(self, event: RangeSeen, now_s: float) -> LocatedScan | None:
         """The scan where it was taken; None when that is doubtful.
 
-        One whose readings have ages is brought to the rover's place of now. Over MAVLink they have the age of the
-        settings, or that which was found; with none they were taken as they came. The position comes over the link,
-        and is half a round trip old when it does. What comes over the same link is as late, and a lidar of the
-        companion's own is not.
+        One whose readings have ages is brought to the rover's place of now. One over MAVLink has the age of the
+        settings, or that which was found, and lies where the rover was then. The position comes over the link, and is
+        half a round trip old when it does. What comes over the same link is as late, and a lidar of the companion's
+        own is not.
         """
         if not self._scans.fits or self._localization.position_doubted:
             return None
-        vehicle, at_s = self._run.vehicle, event.time_s
-        scan = _of_age(event.scan, self._age_s(event))
+        vehicle, scan, at_s = self._run.vehicle, event.scan, event.time_s
         if scan.age_s is not None:
             scan, at_s = replace(scan, age_s=scan.age_s + (now_s - event.time_s)), now_s
         if scan.sender == WIRED:
@@ -114,6 +112,8 @@ class EventDispatcher:
         pose, attitude = vehicle.pose_at(at_s), vehicle.attitude
         if pose is None or attitude is None:
             return None
+        if scan.sender != WIRED and scan.age_s is None and (age_s := self._age_s(event)) > 0.0:
+            pose = self._ages.before(pose, age_s, vehicle.forward_m_s)
         rate_rad_s = attitude.yaw_rate_rad_s
         return LocatedScan(pose, rate_rad_s, deskewed(scan, vehicle.forward_m_s, rate_rad_s))
 
@@ -131,10 +131,3 @@ class EventDispatcher:
             self._told.add(scan.voice)
             self._notifier.tell(f"Ranges ({scan.source}) are {age_s:.2f} s older than positions", Severity.NOTICE)
         return age_s
-
-
-def _of_age(scan: RangeScan, age_s: float) -> RangeScan:
-    """The scan with this age for all readings, unless it knows their ages itself, or they have none."""
-    if age_s == 0.0 or scan.age_s is not None or scan.sender == WIRED:
-        return scan
-    return replace(scan, age_s=np.full(scan.range_m.shape, age_s))

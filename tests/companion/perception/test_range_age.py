@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from companion.core.frames import Pose
 from companion.core.scan import WIRED, RangeScan
 from companion.perception.range_age import LEAST_S, RangeAges
+from companion.vehicle.events import AttitudeSeen
 from tests.support.quick import examples
 
 BEARINGS_RAD = np.radians(np.arange(0.0, 360.0, 5.0))
@@ -59,6 +60,8 @@ def found_s(
     for at in range(50, len(times_s), 10):
         then = at - round(age_s / (PERIOD_S / 10.0))
         scan = scan_at(times_s[then], turns(times_s[then])[0], places[then], noise_m)
+        for time_s in (times_s[at] - 0.5 * PERIOD_S, times_s[at]):
+            ages.hear(AttitudeSeen(time_s, time_s, *turns(time_s)))
         heading_rad, rate_rad_s = turns(times_s[at])
         scan = replace(scan, time_s=times_s[at], **changes)
         ages.note(scan, Pose(*places[at], heading_rad, times_s[at]), 0.2, rate_rad_s)
@@ -94,6 +97,7 @@ def test_each_sensor_has_its_own() -> None:
     ages = RangeAges()
     for time_s in np.arange(1.0, 7.0, PERIOD_S):
         heading_rad, rate_rad_s = to_and_fro(time_s)
+        ages.hear(AttitudeSeen(time_s, time_s, heading_rad, rate_rad_s))
         for sensor, age_s in (("young", 0.0), ("old", 0.2)):
             scan = scan_at(time_s, to_and_fro(time_s - age_s)[0], (0.0, 0.0))
             scan = replace(scan, source=sensor)

@@ -115,22 +115,21 @@ def test_a_scan_of_a_wired_lidar_lies_before_the_position_that_came_late_over_th
 def test_ranges_over_the_link_lie_where_the_rover_was_before_as_long_as_they_are_old(
     tmp_path: Path, sender: int, told_s: float, age_s: float
 ) -> None:
-    """A rover that turns at 1 rad/s and rolls at 1 m/s: something 4 m ahead 0.2 s ago lies to the left, and nearer."""
+    """A rover that turns at 1 rad/s and rolls at 1 m/s: it came on an arc of 1 m."""
     heard = Heard(tmp_path, settings=parse_settings({"mapping": {"range_age_s": told_s}}, "here"))
     seen = heard.desk.stand(2.0, 3.0)
     now_s = heard.desk.now_s
     assert seen.scan is not None and seen.position is not None and seen.attitude is not None
-    turning = replace(seen.attitude, time_s=now_s, heading_rad=0.0, yaw_rate_rad_s=1.0)
-    heard.desk.run.vehicle = replace(
-        seen, attitude=turning, position=replace(seen.position, time_s=now_s, north_m_s=1.0, east_m_s=0.0)
-    )
-    ahead = replace(seen.scan.scan, time_s=now_s, sender=sender, bearing_rad=np.array([0.0]), range_m=np.array([4.0]))
-    (found,) = heard.listen(RangeSeen(now_s, ahead))
-    bearing_rad, range_m = found.scan.bearing_rad[0], found.scan.range_m[0]
-    behind_m = np.array([math.sin(age_s), math.cos(age_s) - 1.0])  # of an arc of 1 m radius
-    there = 4.0 * np.array([math.cos(age_s), -math.sin(age_s)]) - behind_m
-    assert (range_m * math.cos(bearing_rad), range_m * math.sin(bearing_rad)) == pytest.approx(tuple(there), abs=1e-9)
-    assert (found.pose.north_m, found.scan.age_s) == (2.0, None)
+    for time_s in (now_s - 0.3, now_s - 0.1, now_s):
+        turning = replace(seen.attitude, time_s=time_s, heading_rad=time_s - now_s, yaw_rate_rad_s=1.0)
+        rolling = replace(seen.position, time_s=time_s, north_m_s=1.0, east_m_s=0.0)
+        heard.desk.run.vehicle = replace(seen, attitude=turning, position=rolling)
+        scan = replace(seen.scan.scan, time_s=time_s, sender=sender)
+        (found,) = heard.listen(RangeSeen(time_s, scan))
+    assert found.scan is scan and found.pose.time_s == pytest.approx(now_s - age_s)
+    assert found.pose.heading_rad == pytest.approx(-age_s)
+    there_m = 2.0 - math.sin(age_s), 3.0 + 1.0 - math.cos(age_s)
+    assert (found.pose.north_m, found.pose.east_m) == pytest.approx(there_m, abs=0.002)
 
 
 @pytest.mark.parametrize("told_s", [None, 0.0])
@@ -144,7 +143,7 @@ def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
     heard.notifier.tell = lambda text, severity: told.append(text)
     seen = heard.desk.stand(0.0, 0.0)
     assert seen.position is not None and seen.attitude is not None
-    bearings_rad = []
+    turned_rad = []
     for time_s in heard.desk.now_s + np.arange(0.0, 6.0, 0.1):
         heading_rad, rate_rad_s = to_and_fro(time_s)
         heard.desk.run.vehicle = replace(
@@ -155,7 +154,7 @@ def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
         scan = replace(scan_at(time_s, to_and_fro(time_s - 0.2)[0], (0.0, 0.0)), time_s=time_s)
         heard.desk.autopilot.events = [RangeSeen(time_s, scan)]
         (found,) = heard.dispatcher.listen(time_s)
-        bearings_rad.append(found.scan.bearing_rad[0] / rate_rad_s)
-    assert bearings_rad[0] == 0.0 and bearings_rad[-1] == pytest.approx(0.0 if told_s == 0.0 else -0.2, abs=0.03)
+        turned_rad.append((heading_rad - found.pose.heading_rad) / rate_rad_s)
+    assert turned_rad[0] == 0.0 and turned_rad[-1] == pytest.approx(0.0 if told_s == 0.0 else 0.2, abs=0.03)
     assert len(told) == (0 if told_s == 0.0 else 1)
     assert told_s == 0.0 or told[0].startswith("Ranges (OBSTACLE_DISTANCE) are 0.")
