@@ -166,6 +166,11 @@ class Simulator:
         return float(self._rover[0]["driven_m"])
 
     @property
+    def pilot_acts(self) -> bool:
+        """Whether a fault has a pilot drive the rover."""
+        return self._player.pilot_acts(self.time_s)
+
+    @property
     def drawn_ah(self) -> float:
         """Ampere-hours drawn from the battery."""
         return float(self._rover[0]["drawn_ah"])

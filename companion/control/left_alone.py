@@ -37,8 +37,8 @@ NEARER_M, NEARER_UNSEEN_M = 0.05, 0.1
 cells make ways differ by as much."""
 AWAY_M, AWAY = 0.02, 0.1
 """A rover whose outline lies deeper over something may get so much deeper, so that it gets away; but with each metre it
-must get out of it by the second. Where nothing is planned but the way of a disc (``along``), it may lie as deep over
-anything: guidance lets a disc that stands beside something come nearer by a tenth of a cell."""
+must get out of it by the second. On the way to a position a disc may lie as deep over anything: guidance lets one that
+stands beside something come nearer by a tenth of a cell, of 0.2 m or less."""
 UNDER_M, BESIDE = 0.3, 2.0
 """No sensor sees the ground on which the rover can turn and so much round it, nor what lies that many times its half
 width beside it."""
@@ -126,16 +126,19 @@ def turned_on_the_spot(bearing_rad: float, view: LocalView) -> Places:
     return places
 
 
-def along(way: NDArray[np.float64], radius_m: float, evidence: EvidenceMap, away: float = AWAY) -> tuple[int, int]:
+def along(
+    way: NDArray[np.float64], radius_m: float, evidence: EvidenceMap, away: float = AWAY, deep_m: float = AWAY_M
+) -> tuple[int, int]:
     """How many places of a way a disc of this radius passes before it lies over something that stands there, over a
     closed field or off the map; and how many before its middle is on unseen ground.
 
     ``way``: shape (n, 2), metres north and east in the local frame. ``away``: with each metre the disc must get out of
-    what it lies over at first by so much. A thing may fill the whole of its cell.
+    what it lies over at first by so much. ``deep_m``: so deep it may lie over anything. A thing may fill the whole of
+    its cell.
     """
     corner, reach_m = evidence.base.south_west, radius_m + 0.5 * evidence.evidence_m
     disc = Outline(reach_m, reach_m, reach_m, True)
-    clear, seen = passes(way - np.array((corner.north_m, corner.east_m)), disc, away, _rasters(evidence))
+    clear, seen = passes(way - np.array((corner.north_m, corner.east_m)), disc, away, deep_m, _rasters(evidence))
     return int(clear), int(seen)
 
 
@@ -321,7 +324,7 @@ def meets(places, outline, under, under_m, evidence):
 
 
 @njit(cache=True, nogil=True)
-def passes(way, disc, away, evidence):
+def passes(way, disc, away, deep_m, evidence):
     """See ``along``; places count from the map's corner. What the disc lies over at first may be left, not entered."""
     place = np.array((way[0, 0], way[0, 1], 0.0))
     begins_m, _ = _deepest(place, disc, way[0], math.inf, evidence)
@@ -338,8 +341,8 @@ def passes(way, disc, away, evidence):
         unseen_m = unseen_m + PIECE_M if evidence.log_odds[y, x] == 0.0 else -PIECE_M
         if unseen_m > 0.5 * cell_m and seen == count:
             seen = at - int(round(unseen_m / PIECE_M))  # a corner of a cell alone does not count
-        deep_m, _ = _deepest(place, disc, way[0], math.inf, evidence)
-        if deep_m > max(begins_m - away * gone_m, 0.0) + AWAY_M:
+        lies_m, _ = _deepest(place, disc, way[0], math.inf, evidence)
+        if lies_m > max(begins_m + AWAY_M - away * gone_m, deep_m):
             return at, seen
         if gone_m > corner_m and _is_deep_in_closed(place, evidence, True):
             return at, seen

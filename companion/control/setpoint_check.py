@@ -97,7 +97,7 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
     base_m_s = max(view.speed_m_s, view.settings.steering.scale_base_m_s)
     reach_m = blind_distance_m(abs(forward_m_s), view.settings.guidance) - SLACK_M
     way = _way(view.pose.point, _course_rad(setpoint, view), yaw_rate_rad_s / base_m_s, reach_m)
-    clear, _ = along(way, view.rover.radius_m - NEARER_M, view.evidence, away=0.0)
+    clear, _ = along(way, view.rover.radius_m - NEARER_M, view.evidence, away=0.0, deep_m=0.0)
     return Reason(SetpointFault.INTO_OBSTACLE) if clear < len(way) else None
 
 

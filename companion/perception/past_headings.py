@@ -38,6 +38,10 @@ class PastHeadings:
         while self._past[-1][0] - self._past[0][0] > KEPT_S:
             self._past.popleft()
 
+    def known_s(self, time_s: float) -> float:
+        """Since how long before ``time_s`` headings are known."""
+        return time_s - self._past[0][0] if self._past else 0.0
+
     def turned_rad(self, time_s: float, ages_s: Floats) -> Floats:
         """How far the rover has turned, clockwise, from so long before ``time_s`` on until then.
 

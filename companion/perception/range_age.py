@@ -22,12 +22,13 @@ from numpy.typing import NDArray
 from companion.core.frames import Pose
 from companion.core.scan import WIRED, RangeScan
 from companion.perception.past_headings import PastHeadings
+from companion.perception.scan_filter import Sensor, sensor_of
 from companion.vehicle.events import AttitudeSeen
 
 Floats = NDArray[np.float64]
 
 STEP_S = 0.025
-AGES_S: Floats = np.linspace(-0.05, 0.45, 21)
+AGES_S: Floats = np.linspace(-0.05, 0.6, 27)
 """Those that are tried. Below 0 there are some so that an age of 0 has others on both sides."""
 NOW = 2
 """The number of age 0."""
@@ -39,16 +40,20 @@ LASTS_S, NEAR_M = 3.0, 1.0
 """A scan is compared with one of so long before at most, from so near: both see the same."""
 KEPT = 30
 """Scans to compare with, of each sensor."""
-APART_S = 0.1
-"""Between comparisons: they take a tenth of a millisecond each."""
-SIGHT_M, FEW = 6.0, 12
-"""Readings up to there count, and so many there must be."""
+APART_S, ROUNDING_S = 0.1, 0.001
+"""Between scans that are looked at: a comparison takes some tenths of a millisecond."""
+SIGHT_M, FEW, ENOUGH = 6.0, 12, 72
+"""Readings up to there count; so many there must be, and of more than so many some are left out."""
 FAR_M = 0.4
 """What lies farther from anything seen before is something else."""
-COUNT, MOST = 10, 400
+COUNT, MOST = 12, 200
 """So many comparisons tell something; of more than so many the older ones count less and less."""
+TURNS_RAD_S = 8.0
+"""The differences of the turn rates that were compared must come to so much together."""
 BETTER_M = 0.015
 """By so much better than with no age at all the scans must lie on each other, on average."""
+STAYS = 0.6
+"""An age that was found stays down to this share of ``LEAST_S`` and ``BETTER_M``, so that it does not come and go."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -69,9 +74,10 @@ class _Voice:
     """What is known of one sensor."""
 
     before: deque[_Look] = field(default_factory=lambda: deque(maxlen=KEPT))
-    compared_s: float = -math.inf
+    noted_s: float = -math.inf
     gaps_m: Floats = field(default_factory=lambda: np.zeros(len(AGES_S)))
     count: float = 0.0
+    turns_rad_s: float = 0.0
     age_s: float = 0.0
 
 
@@ -79,7 +85,7 @@ class RangeAges:
     """Finds the age of the ranges of each sensor that sends views over MAVLink, and no ages of its own."""
 
     def __init__(self) -> None:
-        self._voices: dict[tuple[int, str], _Voice] = {}
+        self._voices: dict[Sensor, _Voice] = {}
         self._headings = PastHeadings()
 
     def hear(self, attitude: AttitudeSeen | None) -> None:
@@ -88,18 +94,23 @@ class RangeAges:
 
     def age_s(self, scan: RangeScan) -> float:
         """How old the scan was when it came; 0 as long as nothing else is known."""
-        voice = self._voices.get(scan.voice)
+        voice = self._voices.get(sensor_of(scan))
         return 0.0 if voice is None else voice.age_s
 
     def note(self, scan: RangeScan, pose: Pose, forward_m_s: float, yaw_rate_rad_s: float) -> None:
         """One more scan, as it came. ``pose``, ``forward_m_s``, ``yaw_rate_rad_s``: of the rover when it came."""
-        hit = np.isfinite(scan.range_m) & (scan.range_m < SIGHT_M)
-        if scan.sender == WIRED or scan.age_s is not None or np.count_nonzero(hit) < FEW:
+        hit = np.flatnonzero(np.isfinite(scan.range_m) & (scan.range_m < SIGHT_M))
+        if scan.sender == WIRED or scan.age_s is not None or len(hit) < FEW:
             return
-        voice = self._voices.setdefault(scan.voice, _Voice())
+        voice = self._voices.setdefault(sensor_of(scan), _Voice())
+        known_s = self._headings.known_s(pose.time_s)
+        if known_s < AGES_S[-1] or abs(pose.time_s - voice.noted_s) < APART_S - ROUNDING_S:
+            return
+        voice.noted_s = pose.time_s
+        hit = hit[:: math.ceil(len(hit) / ENOUGH)]
         turned_rad = self._headings.turned_rad(pose.time_s, AGES_S)
         look = _Look(pose, forward_m_s, yaw_rate_rad_s, turned_rad, scan.bearing_rad[hit], scan.range_m[hit])
-        if pose.time_s - voice.compared_s >= APART_S and (other := _other(voice, look)) is not None:
+        if (other := _other(voice, look)) is not None:
             _compare(voice, look, other)
         voice.before.append(look)
 
@@ -123,13 +134,13 @@ def _other(voice: _Voice, look: _Look) -> _Look | None:
 
 
 def _compare(voice: _Voice, look: _Look, other: _Look) -> None:
-    voice.compared_s = look.pose.time_s
     if voice.count >= MOST:
         voice.count, voice.gaps_m = 0.5 * voice.count, 0.5 * voice.gaps_m
     voice.count += 1.0
+    voice.turns_rad_s += abs(look.yaw_rate_rad_s - other.yaw_rate_rad_s)
     voice.gaps_m += mean_gaps_m(*_figures(look), *_figures(other), AGES_S)
-    if voice.count >= COUNT:
-        voice.age_s = _best_s(voice.gaps_m / voice.count)
+    if voice.count >= COUNT and voice.turns_rad_s >= TURNS_RAD_S:
+        voice.age_s = _best_s(voice.gaps_m / voice.count, STAYS if voice.age_s > 0.0 else 1.0)
 
 
 def _figures(look: _Look) -> tuple[tuple[float, float, float], float, Floats, Floats, Floats]:
@@ -138,15 +149,18 @@ def _figures(look: _Look) -> tuple[tuple[float, float, float], float, Floats, Fl
     return place, look.forward_m_s, look.turned_rad, look.bearing_rad, look.range_m
 
 
-def _best_s(gaps_m: Floats) -> float:
-    """The age with the least gap, between those that were tried; 0 where it is hardly better than none."""
+def _best_s(gaps_m: Floats, share: float) -> float:
+    """The age with the least gap, between those that were tried; 0 where it is hardly better than none.
+
+    ``share``: of ``LEAST_S`` and ``BETTER_M`` that it must have.
+    """
     at = int(gaps_m.argmin())
-    if not 0 < at < len(gaps_m) - 1 or gaps_m[NOW] - gaps_m[at] < BETTER_M:
+    if not 0 < at < len(gaps_m) - 1 or gaps_m[NOW] - gaps_m[at] < share * BETTER_M:
         return 0.0
     before, least, after = gaps_m[at - 1 : at + 2]
     bend = before - 2.0 * least + after
     age_s = float(AGES_S[at] + (0.5 * (before - after) / bend * STEP_S if bend > 0.0 else 0.0))
-    return age_s if age_s >= LEAST_S else 0.0
+    return age_s if age_s >= share * LEAST_S else 0.0
 
 
 @njit(cache=True, nogil=True)

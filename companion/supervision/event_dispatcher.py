@@ -23,6 +23,11 @@ from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.vehicle.events import Event, RangeSeen, TextSeen
 from companion.vehicle.state import VehicleState, fold
 
+TOLD_ANEW_S = 0.04
+"""An age of ranges is told again when it has changed by so much."""
+OLD_S = 0.3
+"""What moves, and what comes into view late, is seen later than the rover counts on."""
+
 
 class EventHandler(Protocol):
     """Takes events."""
@@ -72,7 +77,7 @@ class EventDispatcher:
         self._localization = localization
         self._settings = settings
         self._ages = RangeAges()
-        self._told: set[tuple[int, str]] = set()
+        self._told_s: dict[tuple[int, str], float] = {}
 
     def listen(self, now_s: float) -> list[LocatedScan]:
         """Dispatch everything that has come in since the last tick; return the scans that may go on the map."""
@@ -127,7 +132,8 @@ class EventDispatcher:
         if pose is not None and vehicle.attitude is not None:
             self._ages.note(scan, pose, vehicle.forward_m_s, vehicle.attitude.yaw_rate_rad_s)
         age_s = self._ages.age_s(scan)
-        if age_s > 0.0 and scan.voice not in self._told:
-            self._told.add(scan.voice)
-            self._notifier.tell(f"Ranges ({scan.source}) are {age_s:.2f} s older than positions", Severity.NOTICE)
+        if abs(age_s - self._told_s.get(scan.voice, 0.0)) >= TOLD_ANEW_S:
+            self._told_s[scan.voice] = age_s
+            severity = Severity.WARNING if age_s > OLD_S else Severity.NOTICE
+            self._notifier.tell(f"Ranges ({scan.source}) are {age_s:.2f} s older than positions", severity)
         return age_s

@@ -17,7 +17,10 @@ PATIENCE = 5
 
 
 class Person:
-    """Looks on; helps when asked to for long enough. ``gave_up``: why the rover was carried home, if it was."""
+    """Looks on; helps when asked to for long enough, and no pilot has the rover.
+
+    ``helped``: how often. ``gave_up``: why the rover was carried home, if it was.
+    """
 
     def __init__(self) -> None:
         self.helped = 0
@@ -28,7 +31,7 @@ class Person:
     def look(self, drive: Drive, activity: Activity) -> None:
         """To be called often."""
         now_s = drive.simulator.time_s
-        if not activity.needs_person:
+        if not activity.needs_person or drive.simulator.pilot_acts:
             self._asked_s = None
             return
         self._asked_s = now_s if self._asked_s is None else self._asked_s
@@ -36,9 +39,8 @@ class Person:
             return
         vehicle = drive.simulator.vehicle
         self._asked_s = None
-        self.helped += 1
         if set_mode(vehicle, Mode.GUIDED) and arm(vehicle):
-            self._in_vain = 0
+            self.helped, self._in_vain = self.helped + 1, 0
             return
         self._in_vain += 1
         if self._in_vain == PATIENCE:

@@ -84,6 +84,10 @@ class FaultPlayer:
         """Whether a fault is active."""
         return fault.at(self._elapsed_s(fault, now_s))[0]
 
+    def pilot_acts(self, now_s: float) -> bool:
+        """Whether a pilot has the rover."""
+        return any(isinstance(one, PilotTakesOver) and self.is_active(one, now_s) for one, _ in self._faults)
+
     def _elapsed_s(self, fault: Fault, now_s: float) -> float:
         return now_s if fault.since == "boot" else now_s - self._driving_s
 

@@ -33,6 +33,7 @@ def test_after_the_last_attitude_it_turns_on_and_before_the_first_it_had_not() -
     past = heard((1.0, 0.0), (1.1, 0.2), rate_rad_s=0.5)
     assert turned_rad(past, 1.2, 0.1, 0.2, 0.9) == pytest.approx([0.05, 0.25, 0.25])
     assert turned_rad(past, 1.1, -0.1) == pytest.approx([-0.05])
+    assert past.known_s(1.2) == pytest.approx(0.2) and PastHeadings().known_s(1.2) == 0.0
 
 
 def test_nothing_heard_is_no_turn_and_what_is_heard_again_is_no_matter() -> None:
