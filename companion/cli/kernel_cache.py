@@ -12,6 +12,7 @@ import contextlib
 import hashlib
 import os
 import shutil
+import stat
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable, MutableMapping
@@ -33,7 +34,8 @@ def use_cache(environment: MutableMapping[str, str]) -> Path:
     """Tell numba where the kernels are kept and when they are valid. Call it before numba is imported.
 
     The place is what the user has set (``NUMBA_CACHE_DIR``), or the first of these that can be written: systemd's
-    cache directory, systemd's state directory, the user's cache directory (XDG), a new temporary directory.
+    cache directory, systemd's state directory, the user's cache directory (XDG), a directory of the user's own among
+    the temporary files, a new temporary directory.
 
     Raises:
         OSError: nothing can be written, not even a temporary directory.
@@ -41,7 +43,7 @@ def use_cache(environment: MutableMapping[str, str]) -> Path:
     environment.setdefault(LOCATORS, f"{__name__}.Locator,UserProvidedCacheLocator")
     if not environment.get(PLACE):
         writable = (place for base in _bases(environment) if _is_writable(place := base / "kernels"))
-        environment[PLACE] = str(next(writable, None) or tempfile.mkdtemp(prefix="rover-companion-kernels-"))
+        environment[PLACE] = str(next(writable, None) or _temporary())
     # The library of the pictures keeps a list of fonts there, and not in the user's own settings.
     environment.setdefault("MPLCONFIGDIR", str(Path(environment[PLACE]) / "matplotlib"))
     return Path(environment[PLACE])
@@ -170,6 +172,19 @@ def _bases(environment: MutableMapping[str, str]) -> list[Path]:
     given = environment.get("XDG_CACHE_HOME", "")
     home = Path(environment.get("HOME") or "/")
     return [*bases, (Path(given) if given.startswith("/") else home / ".cache") / "rover-companion"]
+
+
+def _temporary() -> Path:
+    """The user's own directory among the temporary files: the next start finds its kernels there.
+
+    Compiled kernels are code. Where the directory is not the user's alone, a new one is made. Raises OSError.
+    """
+    own = Path(tempfile.gettempdir()) / f"rover-companion-kernels-{os.getuid()}"
+    if _is_writable(own):
+        state = own.lstat()
+        if stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and state.st_mode & 0o077 == 0:
+            return own
+    return Path(tempfile.mkdtemp(prefix="rover-companion-kernels-"))
 
 
 def _is_writable(directory: Path) -> bool:

@@ -190,7 +190,8 @@ def _check_search(path: Path, search: SearchTable) -> None:
         section, _, key = name.partition(".")
         usual = getattr(getattr(Settings(), section, None), key or "-", None)
         if isinstance(usual, bool) or not isinstance(usual, int | float):
-            raise CampaignError(f"{path}: search.settings: {name!r:.60} is no number of docs/settings.md")
+            why = "is no number of docs/settings.md with a default that is one: a search moves no others"
+            raise CampaignError(f"{path}: search.settings: {name!r:.60} {why}")
         if not low < high:
             raise CampaignError(f"{path}: search.settings: {name}: {low:g} is not less than {high:g}")
         for bound in (low, high):

@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -42,12 +43,26 @@ def test_the_place_is_the_first_that_can_be_written(tmp_path: Path, given: dict[
     assert environment[kernel_cache.PLACE] == str(place)
 
 
-def test_nowhere_to_write_is_a_temporary_place(tmp_path: Path) -> None:
+@pytest.mark.parametrize("shared", ["", "open to others", "a link"])
+def test_nowhere_to_write_is_a_temporary_place_that_the_next_start_finds_if_it_is_the_users_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, shared: str
+) -> None:
     (tmp_path / "file").touch()
-    environment = {"HOME": str(tmp_path / "file")}
-    place = kernel_cache.use_cache(environment)
-    assert place.is_dir() and environment[kernel_cache.PLACE] == str(place)
-    place.rmdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    own = tmp_path / f"rover-companion-kernels-{os.getuid()}"
+    if shared == "open to others":
+        own.mkdir()
+        own.chmod(0o770)
+    elif shared:
+        (tmp_path / "elsewhere").mkdir(mode=0o700)
+        own.symlink_to(tmp_path / "elsewhere")
+    places = []
+    for _ in range(2):
+        environment = {"HOME": str(tmp_path / "file")}
+        places.append(kernel_cache.use_cache(environment))
+        assert places[-1].is_dir() and environment[kernel_cache.PLACE] == str(places[-1])
+        assert places[-1].stat().st_mode & 0o077 == 0
+    assert (own in places) == (not shared) and (places[0] == places[1]) == (not shared)
 
 
 MODULES = {
