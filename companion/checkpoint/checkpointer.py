@@ -43,6 +43,7 @@ from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import NavState
+from companion.perception.scan_filter import Sensor
 from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import Control
 from companion.vehicle.events import LocalPositionSeen
@@ -103,6 +104,7 @@ class Snapshot:
     sticks_us: tuple[int, int] | None
     guarded: bool
     estimate: ModelEstimate
+    range_ages: tuple[tuple[Sensor, float], ...]
     lap: LapStart
     driven_m: float
 
@@ -254,6 +256,7 @@ class Checkpointer:
             sticks_us=moment.vehicle.sticks.rest_us,
             guarded=moment.vehicle.guard_at(moment.now_s) is not None,
             estimate=executor.estimator.estimate,
+            range_ages=executor.range_ages.found,
             lap=executor.lap_start or LapStart(moment.now_s),
             driven_m=executor.odometer.driven_m,
         )
@@ -319,6 +322,7 @@ def saved_state(snapshot: Snapshot) -> SavedState:
         sticks_us=snapshot.sticks_us,
         guarded=snapshot.guarded,
         estimate=_saved_estimate(snapshot.estimate),
+        range_ages=snapshot.range_ages,
     )
 
 

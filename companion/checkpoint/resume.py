@@ -160,6 +160,7 @@ def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: Ve
     executor.lap_start = LapStart(now_s - state.lap.elapsed_s, -state.lap.driven_m, state.lap.failed_before)
     if state.estimate is not None:
         executor.estimator.go_on(resumed_estimate(state.estimate))
+    executor.range_ages.go_on(state.range_ages)
     shift = grid_shift(state, executor.layout)
     for x, y in state.trail:
         executor.trail.enter(Cell(x + shift.x, y + shift.y))

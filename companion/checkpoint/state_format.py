@@ -59,6 +59,7 @@ MAX_DURATION_S = 1e9
 """Also stands for "forever"."""
 Seconds = Annotated[float, Field(ge=0.0, le=MAX_DURATION_S)]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
+Age = Annotated[float, Field(ge=0.0, le=1.0)]
 Figure = Annotated[float, Field(gt=0.0, le=1e3)]
 FieldNumber = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 GeoPair = tuple[Latitude, Longitude]
@@ -223,6 +224,7 @@ class SavedState(SavedValues):
     ahead of it, constant while both keep running. ``trail``: the way from the start of the mission to here, without
     loops. ``sticks_us``: rest position of the pilot's sticks (steering, throttle), None if they were not seen.
     ``guarded``: a guard on the autopilot was there. ``estimate``: of how the rover follows velocities.
+    ``range_ages``: how old the ranges of sensors over MAVLink are, by sender, message and the eighth of the circle.
     ``lap``, ``commands``: of a patrol, and those of the mission for the autopilot.
     """
 
@@ -245,6 +247,7 @@ class SavedState(SavedValues):
     sticks_us: tuple[Pulse, Pulse] | None = None
     guarded: bool = False
     estimate: SavedEstimate | None = None
+    range_ages: tuple[tuple[tuple[Count, str, Count], Age], ...] = ()
     lap: SavedLap = SavedLap()
     commands: SavedCommands = SavedCommands()
 

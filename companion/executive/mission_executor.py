@@ -62,6 +62,7 @@ from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import StepRunner
 from companion.perception.moving_obstacles import Moving, announced, merged
 from companion.perception.object_tracker import ObjectTracker
+from companion.perception.range_age import RangeAges
 from companion.planning.registry import make_planner
 from companion.recording.recorder import RunLog
 from companion.safety.reasons import RunPhase
@@ -144,7 +145,7 @@ class MissionExecutor:
         self._scan = scan
         given = self._given
         margin_m = given.guidance.narrow_margin_m if scan.is_narrow else 0.0
-        self.estimator = ModelEstimator(following_of(given.motion, {}))
+        self.estimator, self.range_ages = ModelEstimator(following_of(given.motion, {})), RangeAges()
         """How the rover follows velocities."""
         self._limits = RoverLimits(
             rover.radius_m + margin_m,

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -87,6 +88,16 @@ class RangeAges:
     def __init__(self) -> None:
         self._voices: dict[Sensor, _Voice] = {}
         self._headings = PastHeadings()
+
+    @property
+    def found(self) -> tuple[tuple[Sensor, float], ...]:
+        """The ages that were found, s."""
+        return tuple((sensor, voice.age_s) for sensor, voice in self._voices.items() if voice.age_s > 0.0)
+
+    def go_on(self, found: Iterable[tuple[Sensor, float]]) -> None:
+        """Count on what an earlier run had found, until it is found anew."""
+        for sensor, age_s in found:
+            self._voices.setdefault(sensor, _Voice()).age_s = age_s
 
     def hear(self, attitude: AttitudeSeen | None) -> None:
         """The last attitude, after each event."""

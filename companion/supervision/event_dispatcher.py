@@ -10,6 +10,7 @@ from typing import Protocol
 
 from companion.core.scan import WIRED
 from companion.core.severity import Severity
+from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_run import LocatedScan, MissionRun
 from companion.lidar.reader import Lidars
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -76,7 +77,6 @@ class EventDispatcher:
         self._scans = scans
         self._localization = localization
         self._settings = settings
-        self._ages = RangeAges()
         self._told_s: dict[tuple[int, str], float] = {}
 
     def listen(self, now_s: float) -> list[LocatedScan]:
@@ -85,12 +85,13 @@ class EventDispatcher:
         run, found = self._run, []
         for event in newest_ranges(self._heard.poll(now_s)):
             run.vehicle = fold(run.vehicle, event)
-            self._ages.hear(run.vehicle.attitude)
+            if run.executor is not None:
+                run.executor.range_ages.hear(run.vehicle.attitude)
             self._note_text(event)
             for handler in self._handlers:
                 handler.take(event, run.vehicle)
             if run.executor is not None and isinstance(event, RangeSeen):
-                located = self._located(event, now_s)
+                located = self._located(event, now_s, run.executor)
                 found += [] if located is None else [located]
         return found
 
@@ -99,7 +100,7 @@ class EventDispatcher:
         if isinstance(event, TextSeen) and event.severity <= Severity.WARNING:
             self._notifier.note(f"autopilot: {event.text}", Severity(event.severity))
 
-    def _located(self, event: RangeSeen, now_s: float) -> LocatedScan | None:
+    def _located(self, event: RangeSeen, now_s: float, executor: MissionExecutor) -> LocatedScan | None:
         """The scan where it was taken; None when that is doubtful.
 
         One whose readings have ages is brought to the rover's place of now. One over MAVLink has the age of the
@@ -117,12 +118,13 @@ class EventDispatcher:
         pose, attitude = vehicle.pose_at(at_s), vehicle.attitude
         if pose is None or attitude is None:
             return None
-        if scan.sender != WIRED and scan.age_s is None and (age_s := self._age_s(event)) > 0.0:
-            pose = self._ages.before(pose, age_s, vehicle.forward_m_s)
+        ages = executor.range_ages
+        if scan.sender != WIRED and scan.age_s is None and (age_s := self._age_s(event, ages)) > 0.0:
+            pose = ages.before(pose, age_s, vehicle.forward_m_s)
         rate_rad_s = attitude.yaw_rate_rad_s
         return LocatedScan(pose, rate_rad_s, deskewed(scan, vehicle.forward_m_s, rate_rad_s))
 
-    def _age_s(self, event: RangeSeen) -> float:
+    def _age_s(self, event: RangeSeen, ages: RangeAges) -> float:
         """How old the ranges are, over MAVLink; told once of each sensor."""
         set_s = self._settings.current.mapping.range_age_s
         if set_s is not None:
@@ -130,8 +132,8 @@ class EventDispatcher:
         vehicle, scan = self._run.vehicle, event.scan
         pose = vehicle.pose_at(event.time_s)
         if pose is not None and vehicle.attitude is not None:
-            self._ages.note(scan, pose, vehicle.forward_m_s, vehicle.attitude.yaw_rate_rad_s)
-        age_s = self._ages.age_s(scan)
+            ages.note(scan, pose, vehicle.forward_m_s, vehicle.attitude.yaw_rate_rad_s)
+        age_s = ages.age_s(scan)
         if abs(age_s - self._told_s.get(scan.voice, 0.0)) >= TOLD_ANEW_S:
             self._told_s[scan.voice] = age_s
             severity = Severity.WARNING if age_s > OLD_S else Severity.NOTICE

@@ -358,10 +358,13 @@ def test_how_the_rover_follows_is_not_forgotten(tmp_path: Path) -> None:
     began = before.estimator.estimate.began
     found = ModelEstimate(began, began._replace(dead_s=0.4, turn_gain=1.2), 2.5, 2.5, 2.5)
     before.estimator.estimate = found
+    old = ((196, "obstacle distance", 0), 0.15)
+    before.range_ages.go_on([old])
     saved = state_in(tmp_path)
     rig.until(lambda: state_in(tmp_path) != saved, 20.0)
     kill_and_resume(rig, mission)
     rig.until(lambda: rig.companion.mission_run.executor is not None, 20.0)
     after = rig.companion.mission_run.executor
     assert after is not None and after.estimator.estimate.known == found.known
+    assert after.range_ages.found == (old,)
     assert after.estimator.estimate.figures.turn_gain > 1.1 and after.estimator.estimate.figures.dead_s > 0.35

@@ -35,6 +35,7 @@ from companion.executive.return_path import Trail
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.mission import Mission
 from companion.navigation.field_step import NavState, initial_state
+from companion.perception.range_age import RangeAges
 from companion.recording.recorder import NullRecorder
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
@@ -93,6 +94,7 @@ class Executor:
     maps_begun: int = 0
     trail: Trail = field(default_factory=Trail)
     estimator: ModelEstimator = field(default_factory=lambda: ModelEstimator(AS_SHIPPED))
+    range_ages: RangeAges = field(default_factory=RangeAges)
     odometer: Odometer = field(default_factory=Odometer)
     lap_start: LapStart | None = None
 
@@ -203,6 +205,8 @@ def test_at_the_end_the_whole_map_is_saved(bench: Bench) -> None:
 
 
 def test_the_state_has_what_a_resumed_run_needs(bench: Bench, mission: Mission) -> None:
+    old = ((196, "obstacle distance", 0), 0.15)
+    bench.executor.range_ages.go_on([old])
     bench.until_saved()
     bench.executor.progress = replace(bench.executor.progress, phase=MissionPhase.STAY, until_s=bench.now_s + 7.0)
     (update,) = bench.update(released=True)
@@ -216,6 +220,7 @@ def test_the_state_has_what_a_resumed_run_needs(bench: Bench, mission: Mission) 
     assert (state.tally.steps, state.tally.epoch) == (5, 4)
     assert state.estimate is not None
     assert resumed_estimate(state.estimate) == bench.executor.estimator.estimate
+    assert state.range_ages == (old,)
     assert state.draws is not None
     assert state.draws.state == driver.searcher.rng.bit_generator.state["state"]["state"]
 
