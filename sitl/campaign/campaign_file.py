@@ -13,7 +13,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from companion.core.own_parts import OwnPartError
 from companion.executive.controller_choice import check_controller
@@ -41,6 +41,12 @@ GREATEST_SEED = 2**53
 
 class CampaignError(Exception):
     """A campaign that cannot be driven; the text is one line with file, place and remedy."""
+
+
+def _plain_name(name: str) -> str:
+    if re.fullmatch(r"[\w .,+()-]*", name) is None:
+        raise ValueError("it names a folder; use letters, digits, blanks and . , + ( ) - _ alone")
+    return name
 
 
 class SearchPart(StrEnum):
@@ -74,7 +80,7 @@ class CampaignTable(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    name: str = Field(default="", max_length=100, pattern=r"^[\w .,+()-]*$")
+    name: Annotated[str, AfterValidator(_plain_name)] = Field(default="", max_length=100)
     worlds: list[str] = Field(min_length=1)
     seed: int = Field(default=0, ge=0, le=GREATEST_SEED)
     runs: int = Field(default=30, ge=1)

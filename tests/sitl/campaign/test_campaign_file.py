@@ -79,7 +79,7 @@ def test_each_combination_is_one_run_for_each_seed_and_seeds_come_one_after_the_
             "sensors 2: 'none': the companion does not drive without range data; name a suite or a file",
         ),
         ('worlds = ["yard"]\nsensors = ["no.toml"]', "no.toml: cannot be read"),
-        ('name = "../x"\nworlds = ["yard"]', "name: must match the pattern"),
+        ('name = "../x"\nworlds = ["yard"]', "name: it names a folder; use letters, digits"),
         ('worlds = ["yard"]\nplanners = ["collections:OrderedDict"]', "has no plan; docs/planners.md shows one"),
         ('worlds = ["yard"]\noff_model = [1.5]', "off_model"),
         ('worlds = ["yard"]\ntime_limit_s = 1.0', "time_limit_s: 1 s end every run before its rover sets off"),
