@@ -191,7 +191,7 @@ def test_the_record_of_a_single_run_is_named_where_it_is_and_one_that_ended_earl
 ) -> None:
     """The folder that was asked for was named, also if the record had gone to another one."""
     report = SimpleNamespace(outcome="reached", driving_time_s=1.0, collisions=0)
-    drive = SimpleNamespace(run=lambda: report, ended_by=lambda reason: reason)
+    drive = SimpleNamespace(run=lambda *_: report, ended_by=lambda reason: reason)
     monkeypatch.setattr("sitl.cli.campaign.prepared", lambda *_: drive)
     monkeypatch.chdir(campaign.parent)
     run_id = next(iter(specs_of(load_campaign(campaign)))).id

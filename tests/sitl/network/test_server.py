@@ -1,5 +1,7 @@
 """The simulator on real sockets, its time driven by the test."""
 
+import contextlib
+import secrets
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -58,9 +60,12 @@ def bench() -> Iterator[Bench]:
 
 
 def free_port(kind: int = socket.SOCK_STREAM) -> int:
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """One that nobody gets by chance before it is used: the system gives those from 32768 on to who asks for any."""
+    while True:
+        port = 20_000 + secrets.randbelow(12_000)
+        with socket.socket(socket.AF_INET, kind) as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
 def read_all(connection: socket.socket) -> list[Any]:
