@@ -35,9 +35,9 @@ NOW = 2
 """The number of age 0."""
 LEAST_S = 0.05
 """A younger scan lies where it was taken by a few centimetres."""
-OTHER_RAD_S = 0.3
+OTHER_RAD_S = 0.25
 """So much the turn rates of two scans differ at least, or their age does not show."""
-LASTS_S, NEAR_M = 3.0, 1.0
+LASTS_S, NEAR_M = 3.0, 2.5
 """A scan is compared with one of so long before at most, from so near: both see the same."""
 KEPT = 30
 """Scans to compare with, of each sensor."""
@@ -47,14 +47,14 @@ SIGHT_M, FEW, ENOUGH = 6.0, 12, 72
 """Readings up to there count; so many there must be, and of more than so many some are left out."""
 FAR_M = 0.4
 """What lies farther from anything seen before is something else."""
-COUNT, MOST = 12, 200
+COUNT, MOST = 10, 200
 """So many comparisons tell something; of more than so many the older ones count less and less."""
-TURNS_RAD_S = 8.0
+TURNS_RAD_S = 5.0
 """The differences of the turn rates that were compared must come to so much together."""
-BETTER_M = 0.015
-"""By so much better than with no age at all the scans must lie on each other, on average."""
+BETTER_M, BETTER = 0.015, 0.13
+"""By so much, and by this share, scans must lie nearer to each other than with no age at all, on average."""
 STAYS = 0.6
-"""An age that was found stays down to this share of ``LEAST_S`` and ``BETTER_M``, so that it does not come and go."""
+"""An age that was found stays down to this share of these and of ``LEAST_S``, so that it does not come and go."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -163,10 +163,10 @@ def _figures(look: _Look) -> tuple[tuple[float, float, float], float, Floats, Fl
 def _best_s(gaps_m: Floats, share: float) -> float:
     """The age with the least gap, between those that were tried; 0 where it is hardly better than none.
 
-    ``share``: of ``LEAST_S`` and ``BETTER_M`` that it must have.
+    ``share``: of ``LEAST_S``, ``BETTER_M`` and ``BETTER`` that it must have.
     """
-    at = int(gaps_m.argmin())
-    if not 0 < at < len(gaps_m) - 1 or gaps_m[NOW] - gaps_m[at] < share * BETTER_M:
+    at, now_m = int(gaps_m.argmin()), gaps_m[NOW]
+    if not 0 < at < len(gaps_m) - 1 or now_m - gaps_m[at] < share * max(BETTER_M, BETTER * now_m):
         return 0.0
     before, least, after = gaps_m[at - 1 : at + 2]
     bend = before - 2.0 * least + after
