@@ -17,7 +17,7 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.operator.notifications import Notifier
 from companion.perception.deskew import deskewed
 from companion.perception.range_age import RangeAges
-from companion.perception.scan_filter import NEAREST_OF_ALL, newest_ranges
+from companion.perception.scan_filter import NEAREST_OF_ALL, Sensor, newest_ranges, sensor_of
 from companion.safety.watchdogs import ScanMonitor
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.localization_monitor import LocalizationMonitor
@@ -77,7 +77,7 @@ class EventDispatcher:
         self._scans = scans
         self._localization = localization
         self._settings = settings
-        self._told_s: dict[tuple[int, str], float] = {}
+        self._told_s: dict[Sensor, float] = {}
 
     def listen(self, now_s: float) -> list[LocatedScan]:
         """Dispatch everything that has come in since the last tick; return the scans that may go on the map."""
@@ -125,7 +125,7 @@ class EventDispatcher:
         return LocatedScan(pose, rate_rad_s, deskewed(scan, vehicle.forward_m_s, rate_rad_s))
 
     def _age_s(self, event: RangeSeen, ages: RangeAges) -> float:
-        """How old the ranges are, over MAVLink; told once of each sensor."""
+        """How old the ranges are, over MAVLink; told of each sensor when it is found, and when it changes."""
         set_s = self._settings.current.mapping.range_age_s
         if set_s is not None:
             return set_s
@@ -134,8 +134,9 @@ class EventDispatcher:
         if pose is not None and vehicle.attitude is not None:
             ages.note(scan, pose, vehicle.forward_m_s, vehicle.attitude.yaw_rate_rad_s)
         age_s = ages.age_s(scan)
-        if abs(age_s - self._told_s.get(scan.voice, 0.0)) >= TOLD_ANEW_S:
-            self._told_s[scan.voice] = age_s
+        sensor = sensor_of(scan)
+        if abs(age_s - self._told_s.get(sensor, 0.0)) >= TOLD_ANEW_S:
+            self._told_s[sensor] = age_s
             severity = Severity.WARNING if age_s > OLD_S else Severity.NOTICE
             self._notifier.tell(f"Ranges ({scan.source}) are {age_s:.2f} s older than positions", severity)
         return age_s

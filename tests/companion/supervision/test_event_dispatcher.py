@@ -154,6 +154,11 @@ def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
         scan = replace(scan_at(time_s, to_and_fro(time_s - 0.2)[0], (0.0, 0.0)), time_s=time_s)
         heard.desk.autopilot.events = [RangeSeen(time_s, scan)]
         (found,) = heard.dispatcher.listen(time_s)
+        # Beside it one of the same sender and message that looks backwards, and whose ranges are not old.
+        behind = replace(scan_at(time_s, heading_rad, (0.0, 0.0)), time_s=time_s)
+        behind = replace(behind, bearing_rad=np.roll(behind.bearing_rad, 36), range_m=np.roll(behind.range_m, 36))
+        heard.desk.autopilot.events = [RangeSeen(time_s, behind)]
+        heard.dispatcher.listen(time_s)
         turned_rad.append((heading_rad - found.pose.heading_rad) / rate_rad_s)
     assert turned_rad[0] == 0.0 and turned_rad[-1] == pytest.approx(0.0 if told_s == 0.0 else 0.2, abs=0.03)
     assert len(told) == (0 if told_s == 0.0 else 1)
