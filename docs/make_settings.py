@@ -86,7 +86,11 @@ def _row(name: str, field: FieldInfo) -> str:
 
 
 def _value(value: object) -> str:
-    """The value as in TOML."""
+    """The value as in TOML, which has no word for what nobody has set."""
+    if value is None:
+        return "unset"
+    if isinstance(value, bool):
+        return f"`{value}`".lower()
     if isinstance(value, tuple):
         return f"`{_plain(value)}`"
     return f'`"{value}"`' if isinstance(value, str) else f"`{value}`"

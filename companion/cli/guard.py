@@ -21,7 +21,7 @@ HEARD_S = 10.0
 STEP_S = 0.02
 EXIT_NOT_THERE, EXIT_NOBODY = 3, 4
 WHAT_NEXT = (
-    "set SCR_ENABLE to 1 and SCR_USER1 to 300 (milliseconds), and restart the autopilot; then `rover-companion doctor` "
+    "SCR_ENABLE must be 1 and SCR_USER1 300 (milliseconds); then restart the autopilot, and `rover-companion doctor` "
     "shows whether it is there"
 )
 GONE = "; the script that was there may be gone: install it again before you restart the autopilot"

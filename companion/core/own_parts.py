@@ -64,7 +64,7 @@ def own_part(kind: OwnKind, name: str) -> Any:
     except (Exception, SystemExit) as error:
         if is_interrupt(error):
             raise
-        raise OwnPartError(f"{kind} {name!r:.80} cannot be loaded: {_reason(error)}") from error
+        raise OwnPartError(f"{kind} {name!r:.80} cannot be loaded: {_reason(error)}{_remedy(name, error)}") from error
     if not callable(found):
         raise OwnPartError(f"{kind} {name!r:.80} is no class or function that makes a {kind}")
     return found
@@ -118,6 +118,11 @@ def raised(kind: OwnKind, name: str, error: BaseException) -> str:
 
 def _reason(error: BaseException) -> str:
     return " ".join(f"{type(error).__name__}: {error}".split())[:200]
+
+
+def _remedy(name: str, error: BaseException) -> str:
+    missing = isinstance(error, ModuleNotFoundError) and error.name == name.partition(":")[0]
+    return "; it is looked for among the installed packages and in this folder" if missing else ""
 
 
 def _imported(module: str) -> object:

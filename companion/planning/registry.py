@@ -61,7 +61,7 @@ def make_planner(name: str, settings: PlannerSettings) -> Planner:
         known = (*PLANNERS, *registered(OwnKind.PLANNER))
         near = alike(name, known)
         hint = f", did you mean {near!r}?" if near else ";"
-        raise UnknownPlannerError(f"unknown planner {name!r}{hint} known: {', '.join(known)}")
+        raise UnknownPlannerError(f"unknown planner {name!r}{hint} known: {', '.join(known)}; one's own: module:name")
     try:
         own: Planner = made_by(OwnKind.PLANNER, name, ("plan", "name", "capabilities"), settings)
     except OwnPartError as error:

@@ -159,5 +159,6 @@ def _valid(model: type[Model], values: dict[str, Any]) -> Model:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        known = ", ".join(model.model_fields)
-        raise ValueError(f"{' '.join(describe_first(error, model).split())}; known: {known}") from None
+        reason = " ".join(describe_first(error, model).split())
+        known = "" if "known here" in reason else f"; known here: {', '.join(model.model_fields)}"
+        raise ValueError(f"{reason}{known}") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated
@@ -77,11 +78,13 @@ def _is_file(mission: Path) -> bool:
 
 
 def _load(file: Path) -> None:
-    """Raises CampaignError without the file's name: nobody has written it."""
+    """Raises CampaignError that names options: nobody has written the file and its lists."""
     try:
         load_campaign(file)
     except CampaignError as error:
-        raise CampaignError(str(error).replace(f"{file}: ", "")) from error
+        text = str(error).replace(f"{file}: ", "").partition("; docs/campaigns.md")[0]
+        text = re.sub(r"^(planners|controllers)( \d+)?:", r"--\1:", text)
+        raise CampaignError(re.sub(r"^worlds( \d+)?:", "MISSION:", text)) from error
 
 
 def _campaign(missions: list[Path], folder: Path, planners: str, controllers: str, seeds: int) -> str:

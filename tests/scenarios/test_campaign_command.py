@@ -220,7 +220,7 @@ def test_planners_side_by_side_are_a_campaign_with_a_plot(campaign: Path, monkey
     assert [line["run"]["planner"] for line in lines_of(Path("out/compare"))] == ["astar", "dijkstra"]
     kept = Path("out/compare/campaign.toml").read_text(encoding="utf-8")
     for arguments, says in (
-        (("yard.toml", "--planners", "astr"), "planners 1: unknown planner 'astr'"),
+        (("yard.toml", "--planners", "astr"), "--planners: unknown planner 'astr'"),
         (("yard.toml", "--planners", " , "), "--planners ' , ': names nothing"),
         (("no.toml", "--planners", "astar"), "no.toml: no such mission file"),
     ):

@@ -38,7 +38,7 @@ def test_faults_one_after_the_other(tmp_path: Path) -> None:
     [
         ("rooms movers=many", "movers=many: give a whole number from 0 to 50"),
         ("rooms least_door_m=0.2", "least_door_m"),
-        ("rooms door_m=2", "known: least_door_m, most_door_m, room_m"),
+        ("rooms door_m=2", "known here: least_door_m, most_door_m, room_m"),
         ("rooms movers", "movers: write NAME=VALUE after rooms"),
         ("rooms movers=1 movers=2", "movers stands there twice"),
         ("rooms least_door_m=3 most_door_m=2", "most_door_m 2 is less than least_door_m 3"),
