@@ -280,8 +280,16 @@ def _nearer(row, beside):
 @njit(cache=True, nogil=True)
 def look(log_odds, base, penalty, start, end, half_width, radius, occupied_at):
     """How far a disc of this half width can go from start (x, y) towards end, and how far the line has been seen."""
+    length, seen = look_at_line(log_odds, base, penalty, start, end)
+    return look_beside(log_odds, start, end, length, half_width, radius, occupied_at), seen
+
+
+@njit(cache=True, nogil=True)
+def look_at_line(log_odds, base, penalty, start, end):
+    """How far a line from start (x, y) towards end is open by mission and penalty, and how far it has been seen."""
     height, width = log_odds.shape
     s = height // base.shape[0]  # evidence cells along the side of a field
+    share = 1.0 / s
     x0, y0 = start
     x1, y1 = end
     length = math.hypot(x1 - x0, y1 - y0)
@@ -297,12 +305,26 @@ def look(log_odds, base, penalty, start, end, half_width, radius, occupied_at):
         if not (0 <= x < width and 0 <= y < height):
             length = min(d, seen)
             break
-        if base[y // s, x // s] + penalty[y // s, x // s] >= 1.0 and d > s * 0.75:
+        fx, fy = int((x + 0.5) * share), int((y + 0.5) * share)  # a division takes as long as all the rest
+        if base[fy, fx] + penalty[fy, fx] >= 1.0 and d > s * 0.75:
             length = d
             break
         if log_odds[y, x] == 0.0 and d < seen:
             seen = d
         d += 0.5
+    return length, min(seen, length)
+
+
+@njit(cache=True, nogil=True)
+def look_beside(log_odds, start, end, length, half_width, radius, occupied_at):
+    """How far of this length a disc of this half width can go from start (x, y) towards end: to the first obstacle."""
+    height, width = log_odds.shape
+    x0, y0 = start
+    apart = math.hypot(end[0] - x0, end[1] - y0)
+    if apart < 1e-9:
+        return 0.0
+    dx = (end[0] - x0) / apart
+    dy = (end[1] - y0) / apart
     # An obstacle may fill its whole evidence cell, not only the middle.
     half_width += 0.5
     radius = min(radius + 0.5, half_width)
@@ -313,11 +335,15 @@ def look(log_odds, base, penalty, start, end, half_width, radius, occupied_at):
     low = max(0, int(min(y0, y0 + dy * length)) - r)
     high = min(height, int(max(y0, y0 + dy * length)) + r + 1)
     for y in range(low, high):
-        for x in range(left, right):
+        py = y + 0.5 - y0
+        first, last = left, right
+        if abs(dy) > 0.01:  # of a slanting line's box only the cells beside the line, and one more on each side
+            middle, aside = x0 + py * dx / dy, half_width / abs(dy) + 2.0
+            first, last = max(left, int(middle - aside)), min(right, int(middle + aside) + 1)
+        for x in range(first, last):
             if log_odds[y, x] < occupied_at:
                 continue
             px = x + 0.5 - x0
-            py = y + 0.5 - y0
             along = px * dx + py * dy
             across = abs(px * dy - py * dx)
             # An obstacle nearer than the wanted room must not come nearer still (so the rover can leave a wall), and
@@ -329,7 +355,7 @@ def look(log_odds, base, penalty, start, end, half_width, radius, occupied_at):
             contact = along - math.sqrt(room * room - across * across)
             if contact < clear:
                 clear = max(contact, 0.0)
-    return clear, min(seen, length)
+    return clear
 
 
 @njit(cache=True, nogil=True)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-from companion.mapping.evidence_kernels import first_unseen, look
+from companion.mapping.evidence_kernels import first_unseen, look_at_line, look_beside
 
 
 class Stopping(NamedTuple):
@@ -49,8 +49,9 @@ def may_stop_at(ground, start, target, stopping):
     if distance == 0.0:
         return True
     ahead = (east / distance, north / distance)
-    clear, seen = _look(ground, start, target, stopping.radius + stopping.room, stopping)
-    if min(clear, seen) < distance - stopping.slack:
+    room, enough = stopping.radius + stopping.room, distance - stopping.slack
+    length, seen = _at_line(ground, start, target)
+    if seen < enough or _beside(ground, start, target, length, room, stopping) < enough:
         return False
     overshoot = min(stopping.overshoot, max(0.1 * distance, stopping.rolling)) + stopping.held
     stands = moved_within_map(ground, target, ahead, overshoot, stopping.edge)
@@ -58,17 +59,17 @@ def may_stop_at(ground, start, target, stopping):
     # The flanks first: with thin beams they fail most often.
     if first_unseen(ground.log_odds, start, stands, stopping.flank, stopping.near)[0] < length - 1e-6:
         return False
-    if _look(ground, start, stands, stopping.radius, stopping)[1] < length - stopping.slack:
+    if _at_line(ground, start, stands)[1] < length - stopping.slack:
         return False
     unsure = min(stopping.unsure, 0.05 * distance)
     # A cell counts by its middle, and what it stands for may begin half a cell before.
     beyond = moved_within_map(ground, target, ahead, overshoot + unsure + 0.5, stopping.edge)
     length = math.hypot(beyond[0] - start[0], beyond[1] - start[1])
-    if _look(ground, start, beyond, stopping.radius, stopping)[0] < length - 1e-6:
+    open_for = _at_line(ground, start, beyond)[0]
+    if _beside(ground, start, beyond, open_for, stopping.radius, stopping) < length - 1e-6:
         return False
     front = moved_within_map(ground, stands, ahead, stopping.radius + unsure, stopping.edge)
-    seen = _look(ground, stands, front, 0.0, stopping)[1]
-    return seen >= math.hypot(front[0] - stands[0], front[1] - stands[1]) - stopping.slack
+    return _at_line(ground, stands, front)[1] >= math.hypot(front[0] - stands[0], front[1] - stands[1]) - stopping.slack
 
 
 @njit(cache=True, nogil=True)
@@ -92,10 +93,13 @@ def stops_in_a_row(ground, start, targets, stopping):
 
 
 @njit(cache=True, nogil=True)
-def _look(ground, start, end, half_width, stopping):
-    return look(
-        ground.log_odds, ground.base, ground.penalty, start, end, half_width, stopping.map_radius, ground.occupied_at
-    )
+def _at_line(ground, start, end):
+    return look_at_line(ground.log_odds, ground.base, ground.penalty, start, end)
+
+
+@njit(cache=True, nogil=True)
+def _beside(ground, start, end, length, half_width, stopping):
+    return look_beside(ground.log_odds, start, end, length, half_width, stopping.map_radius, ground.occupied_at)
 
 
 @njit(cache=True, nogil=True)
