@@ -135,13 +135,13 @@ class RangeAges:
 def _other(voice: _Voice, look: _Look) -> _Look | None:
     """The scan that has seen the same a moment before, while the rover turned at the most different rate."""
     here, rate_rad_s = look.pose, look.yaw_rate_rad_s
+    turned_otherwise = (one for one in voice.before if abs(one.yaw_rate_rad_s - rate_rad_s) >= OTHER_RAD_S)
     alike = (
         one
-        for one in voice.before
+        for one in turned_otherwise
         if here.time_s - one.pose.time_s < LASTS_S and here.point.distance_m(one.pose.point) < NEAR_M
     )
-    best = max(alike, key=lambda one: abs(one.yaw_rate_rad_s - rate_rad_s), default=None)
-    return None if best is None or abs(best.yaw_rate_rad_s - rate_rad_s) < OTHER_RAD_S else best
+    return max(alike, key=lambda one: abs(one.yaw_rate_rad_s - rate_rad_s), default=None)
 
 
 def _compare(voice: _Voice, look: _Look, other: _Look) -> None:
