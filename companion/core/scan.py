@@ -45,6 +45,8 @@ class RangeScan:
     origin_m: tuple[float, float] = (0.0, 0.0)
     """Where the rays begin: metres forward and right of the rover's middle. Readings still count from the middle."""
 
+    came_s: float | None = None
+    """When it would have come without the jitter of its way, by the sensor's own clock; None: as ``time_s``."""
     late_s: float = 0.0
     """How late it came by the sensor's own clock, compared with the best moment of the run; 0 if it tells none."""
 

@@ -20,11 +20,13 @@ An autopilot repeats much of what it receives or measures in a coarser form (an 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.arrival_jitter import ArrivalJitter
 from companion.core.scan import RangeScan
 from companion.mavlink import points
 from companion.mavlink.framing import AUTOPILOT
@@ -65,6 +67,7 @@ class RangeDecoder:
         """When data finer than sectors last showed an obstacle, by octants of the circle."""
         self._heard_s: dict[Sensor, float] = {}
         """When each sensor was heard last."""
+        self._jitter: dict[Sensor, ArrivalJitter] = {}
 
     def vehicle_heard(self, time_s: float) -> None:
         """Call when the vehicle is heard; the first time counts."""
@@ -80,15 +83,24 @@ class RangeDecoder:
         if number == points.MESSAGE:
             return self._with_place(self._points.add(message, time_s, sender), finer=True)
         if number == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE:
-            return self._with_place(obstacle_distance(message, time_s, sender), finer=True)
+            seen = obstacle_distance(message, time_s, sender)
+            return self._with_place(seen and self._timed(seen, message.time_usec * 1e-6), finer=True)
         sector = sender == AUTOPILOT and is_sector(message)
         scan = distance_sensor(message, time_s, sender, sector=sector)
         if scan is None or (sector and self._is_echo(message.orientation, scan)):
             return None
-        scan = self._with_place(scan, coarse=sector)
+        scan = self._with_place(self._timed(scan, message.time_boot_ms * 1e-3), coarse=sector)
         if scan is not None and not sector:
             self._beam_s[message.orientation] = time_s
         return scan
+
+    def _timed(self, scan: RangeScan, told_s: float) -> RangeScan:
+        """The scan without the jitter of its way, by the time in its message."""
+        if len(self._jitter) > MOST_SCANS:
+            self._jitter.clear()
+        jitter = self._jitter.get(sensor_of(scan), ArrivalJitter()).after(scan.time_s, told_s)
+        self._jitter[sensor_of(scan)] = jitter
+        return replace(scan, came_s=jitter.came_s(scan.time_s, told_s))
 
     def complete(self, time_s: float) -> list[RangeScan]:
         """The scans of points whose look is complete at the first bytes of a later time."""

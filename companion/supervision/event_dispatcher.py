@@ -53,6 +53,11 @@ class Heard:
         return [*filter(_is_no_last_resort, events), *self._lidars.poll(now_s)]
 
 
+def _came_s(event: RangeSeen) -> float:
+    """When a scan came, without the jitter of its way."""
+    return event.time_s if event.scan.came_s is None else event.scan.came_s
+
+
 def _is_no_last_resort(event: Event) -> bool:
     return not isinstance(event, RangeSeen) or event.scan.source != NEAREST_OF_ALL
 
@@ -110,7 +115,7 @@ class EventDispatcher:
         """
         if not self._scans.fits or self._localization.position_doubted:
             return None
-        vehicle, scan, at_s = self._run.vehicle, event.scan, event.time_s
+        vehicle, scan, at_s = self._run.vehicle, event.scan, _came_s(event)
         if scan.age_s is not None:
             scan, at_s = replace(scan, age_s=scan.age_s + (now_s - event.time_s)), now_s
         if scan.sender == WIRED:
@@ -130,7 +135,7 @@ class EventDispatcher:
         if set_s is not None:
             return set_s
         vehicle, scan = self._run.vehicle, event.scan
-        pose = vehicle.pose_at(event.time_s)
+        pose = vehicle.pose_at(_came_s(event))
         if pose is not None and vehicle.attitude is not None:
             ages.note(scan, pose, vehicle.forward_m_s, vehicle.attitude.yaw_rate_rad_s)
         age_s = ages.age_s(scan)

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, field
 from enum import Enum
 
+from companion.core.arrival_jitter import MOST_S, ArrivalJitter
 from companion.core.changed import changed
 from companion.core.frames import Pose
 from companion.vehicle import guard
@@ -99,6 +100,8 @@ class VehicleState:
     """The autopilot's boot time has run back: kept until a person sets GUIDED again."""
     latency: Latency = field(default_factory=Latency)
     """How late the link is."""
+    jitter: ArrivalJitter = field(default_factory=ArrivalJitter)
+    """Of position reports, and so of all that bears the autopilot's boot time."""
     sticks: Sticks = field(default_factory=Sticks)
     """Whether a pilot has moved the sticks since a person set GUIDED."""
     parameters: dict[str, float] = field(default_factory=dict)
@@ -122,17 +125,23 @@ class VehicleState:
         return not self.in_auto or (self.leg is not None and self.leg.state is LegState.LIVE)
 
     def pose_at(self, time_s: float) -> Pose | None:
-        """Position and heading, extrapolated to a time with the last velocities; None until both are known."""
+        """Position and heading at a time, by the last velocities; None until both are known.
+
+        The jitter of their arrival does not count, which the autopilot's boot time shows.
+        """
         if self.position is None or self.attitude is None:
             return None
-        ahead_s = min(max(time_s - self.position.time_s, 0.0), 0.5)
-        turn_s = min(max(time_s - self.attitude.time_s, 0.0), 0.5)
+        ahead_s, turn_s = self._since_s(self.position, time_s), self._since_s(self.attitude, time_s)
         return Pose(
             self.position.north_m + self.position.north_m_s * ahead_s,
             self.position.east_m + self.position.east_m_s * ahead_s,
             self.attitude.heading_rad + self.attitude.yaw_rate_rad_s * turn_s,
             time_s,
         )
+
+    def _since_s(self, report: LocalPositionSeen | AttitudeSeen, time_s: float) -> float:
+        """The time since a report; below 0 before it."""
+        return min(max(time_s - self.jitter.came_s(report.time_s, report.boot_s), -MOST_S), 0.5)
 
     @property
     def speed_m_s(self) -> float:
@@ -265,11 +274,17 @@ def _with_position(state: VehicleState, now: LocalPositionSeen) -> VehicleState:
     before = state.position
     if before is not None and now.boot_s < before.boot_s - BACK_S:
         off_m = jump_m(before, now, clock_jumped=True)
-        return changed(state, position=now, jump_m=off_m, restarted=True, latency=Latency(), reckoned=None)
+        jitter = ArrivalJitter().after(now.time_s, now.boot_s)
+        return changed(
+            state, position=now, jump_m=off_m, restarted=True, latency=Latency(), jitter=jitter, reckoned=None
+        )
     latency = latency_after_report(state.latency, now.time_s, now.boot_s)
     clock_jumped = latency.jumped_s == now.time_s
     so_far, frozen = reckoning_after(None if clock_jumped else state.reckoned, before, now)
     off_m = jump_m(before, now, clock_jumped=clock_jumped)
     frozen = state.frozen or frozen
     wander = drift_after(state.wander, before, now)
-    return changed(state, position=now, jump_m=off_m, reckoned=so_far, frozen=frozen, latency=latency, wander=wander)
+    jitter = state.jitter.after(now.time_s, now.boot_s)
+    return changed(
+        state, position=now, jump_m=off_m, reckoned=so_far, frozen=frozen, latency=latency, jitter=jitter, wander=wander
+    )

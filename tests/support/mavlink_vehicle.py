@@ -49,10 +49,11 @@ class Station:
         quality: int = 0,
         fov_rad: float = 0.0,
         quaternion: list[float] | None = None,
+        time_boot_ms: int = 0,
     ) -> bytes:
         return self.pack(
             mavlink.MAVLink_distance_sensor_message(
-                0, min_cm, max_cm, current_cm, 0, sensor_id, orientation, 0, fov_rad, 0.0,
+                time_boot_ms, min_cm, max_cm, current_cm, 0, sensor_id, orientation, 0, fov_rad, 0.0,
                 quaternion or NAN_QUATERNION, quality,
             )
         )  # fmt: skip
@@ -67,11 +68,12 @@ class Station:
         min_cm: int = 20,
         max_cm: int = 800,
         frame: int = 12,
+        time_usec: int = 0,
     ) -> bytes:
         filled = distances_cm + [65535] * (72 - len(distances_cm))
         return self.pack(
             mavlink.MAVLink_obstacle_distance_message(
-                0, 0, filled, increment, min_cm, max_cm, increment_f, offset_deg, frame
+                time_usec, 0, filled, increment, min_cm, max_cm, increment_f, offset_deg, frame
             )
         )
 

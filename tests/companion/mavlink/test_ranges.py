@@ -38,6 +38,22 @@ def test_orientation_counts_clockwise_from_ahead(listener: Listener, orientation
     assert (scan.min_range_m, scan.max_range_m) == (0.2, 20.0)
 
 
+def test_scans_that_wait_on_their_way_would_have_come_sooner_by_their_own_clock(listener: Listener) -> None:
+    """A lidar's in microseconds since 1970, a rangefinder's in milliseconds since its start."""
+    for number in range(40):
+        made_s = 0.1 * number
+        waited_s = 0.08 if number % 4 == 3 else 0.0
+        lidar, beam = listener.lidar, listener.rover
+        for raw in (
+            lidar.cells([300] * 72, time_usec=round(1e6 * (1.7e9 + made_s))),
+            beam.distance(350, 0, time_boot_ms=round(1e3 * made_s)),
+        ):
+            (scan,) = listener.scans(raw, 10.0 + made_s + waited_s)
+            assert scan.time_s == 10.0 + made_s + waited_s
+            if number > 20:
+                assert scan.came_s == pytest.approx(10.0 + made_s, abs=0.002)
+
+
 @pytest.mark.parametrize("orientation", [8, 12, 24, 25, 99])
 def test_sensors_that_do_not_look_along_the_ground_are_left_out(listener: Listener, orientation: int) -> None:
     assert listener.scans(listener.rover.distance(350, orientation)) == []

@@ -58,6 +58,7 @@ def test_the_newest_is_kept(event: Event, name: str) -> None:
         "reckoned",
         "restarted",
         "latency",
+        "jitter",
         "sticks",
         "in_auto",
         "wander",
@@ -124,11 +125,29 @@ def test_pose_is_carried_forward() -> None:
     assert pose.time_s == 10.2
 
 
-def test_pose_is_not_carried_far_nor_backwards() -> None:
-    late, early = moving().pose_at(60.0), moving().pose_at(9.0)
-    assert late is not None and early is not None
+def test_pose_is_carried_neither_far_nor_back_by_more_than_jitter() -> None:
+    late, early, before = (moving().pose_at(time_s) for time_s in (60.0, 9.0, 9.8))
+    assert late is not None and early is not None and before is not None
     assert (late.north_m, late.east_m, late.heading_rad) == (101.0, 49.5, 1.25)
-    assert (early.north_m, early.east_m, early.heading_rad) == (100.0, 50.0, 1.0)
+    assert (early.north_m, early.east_m, early.heading_rad) == (99.5, 50.25, 0.875)
+    assert (before.north_m, before.east_m) == (pytest.approx(99.6), pytest.approx(50.2))
+
+
+def test_reports_that_wait_on_their_way_do_not_move_the_pose() -> None:
+    """Reports every 0.05 s, taken in by ticks of a computer that is now and then late by up to 0.1 s."""
+    rng = np.random.default_rng(0)
+    state, off_m = VehicleState(), []
+    for number in range(200):
+        boot_s = 0.05 * number
+        time_s = 30.0 + boot_s + (0.0 if number % 3 else float(rng.uniform(0.0, 0.1)))
+        state = fold(state, LocalPositionSeen(time_s, boot_s, 2.0 * boot_s, 0.0, 2.0, 0.0))
+        state = fold(state, AttitudeSeen(time_s, boot_s, 0.5 * boot_s, 0.5))
+        pose = state.pose_at(time_s)
+        assert pose is not None
+        if number > 60:  # two windows, and the one that it began in
+            off_m.append(pose.north_m - 2.0 * (time_s - 30.0))
+            assert pose.heading_rad == pytest.approx(0.5 * (time_s - 30.0), abs=0.005)
+    assert np.ptp(off_m) < 0.015, "0.2 m, were each taken for new when it comes"
 
 
 def test_no_pose_without_both_position_and_attitude() -> None:

@@ -1,0 +1,54 @@
+"""Arrival jitter: how much later than at best a sender's messages come, by the time that it writes into them.
+
+Messages are taken in tick by tick, and wait on the way now and then. A rover at 2 m/s drives 0.1 m in a tick: so far a
+wall would jump to and fro on the map from scan to scan, and where a ray ends behind it the map forgets it.
+
+Nouns: arrival jitter.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+WINDOW_S = 1.0
+"""The best of the present window and of the one before counts: a sender's clock may stand still for once, or jump. All
+windows begin at the same moments, so that what two senders tell stays together where both come later from now on."""
+LEAST_S, MOST_S = 0.005, 0.25
+"""Less is the rounding of clocks. More is a link that fails."""
+AGREE_S = 0.06
+"""So well windows must agree: a tick, and a little. Times that stand still, or count something else, never do."""
+
+
+@dataclass(frozen=True, slots=True)
+class ArrivalJitter:
+    """Of one sender. Times by two clocks differ by a shift, which is least for what comes at once."""
+
+    window: int = -1
+    """The number of the present window."""
+    least_s: float = math.inf
+    """The least shift in it."""
+    before_s: float = math.inf
+    """In the one before."""
+    earlier_s: float = -math.inf
+    """In the one before that."""
+    earliest_s: float = math.inf
+    """In the one before that."""
+
+    def after(self, time_s: float, told_s: float) -> ArrivalJitter:
+        """One more message came at ``time_s``; its sender wrote ``told_s`` into it."""
+        shift_s, window = time_s - told_s, math.floor(time_s / WINDOW_S)
+        if window == self.window:
+            return replace(self, least_s=min(self.least_s, shift_s))
+        if window == self.window + 1:
+            return ArrivalJitter(window, shift_s, self.least_s, self.before_s, self.earlier_s)
+        return ArrivalJitter(window, shift_s)
+
+    def came_s(self, time_s: float, told_s: float) -> float:
+        """When that message would have come if it were as quick as the best; ``time_s`` where that is not known."""
+        # One jump is forgiven.
+        least_apart_s = min(abs(self.before_s - self.earlier_s), abs(self.earlier_s - self.earliest_s))
+        if least_apart_s > AGREE_S:
+            return time_s
+        late_s = time_s - told_s - min(self.least_s, self.before_s)
+        return time_s - late_s if LEAST_S < late_s <= MOST_S else time_s
