@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from companion.control import safe_reach
+from companion.core import arrival_jitter
 from companion.core.tick_marks import Mark
 from companion.recording.reader import load_record
 from companion.recording.record_format import packed_tick, unpacked_ticks
@@ -149,8 +150,10 @@ def test_a_record_of_the_real_firmware_that_an_older_version_made_is_replayed(mo
     """Its settings have a key that is called otherwise today, and none for the rules that contacts have led to.
 
     Without those rules the same is decided until the map is another one: beams free less beside their middle now.
+    Positions and ranges counted from when they came.
     """
     monkeypatch.setattr(safe_reach, "UNSURE_M", 0.0)
+    monkeypatch.setattr(arrival_jitter, "MOST_S", 0.0)
     record = load_record(SHARED / "data" / "real-firmware" / "wall-end")
     assert "errand_reach_m" in str(record.meta.settings) and record.settings.safety.requested_goal_m == 300.0
     guidance = record.settings.guidance.model_copy(update={"swing_m_s2": 1e9, "held_overshoot_s": 0.0})
