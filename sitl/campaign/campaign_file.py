@@ -63,8 +63,9 @@ class SearchPart(StrEnum):
 class SearchTable(BaseModel):
     """``[search]``: what ``--search`` moves.
 
-    ``settings``: bounds of more settings than the tunable ones, or other bounds. Things that move are not among what is
-    moved without a word: a rover that moves among things that never yield is touched now and then.
+    ``settings``: bounds of more settings than the tunable ones, or other bounds. ``faults_until_s``: when the last one
+    may begin, from when the rover begins to drive. Things that move are not among what is moved without a word: a rover
+    that moves among things that never yield is touched now and then.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
@@ -73,6 +74,7 @@ class SearchTable(BaseModel):
         default=[one for one in SearchPart if one is not SearchPart.TRAFFIC], min_length=1
     )
     settings: dict[str, Annotated[tuple[float, float], Field(strict=False)]] = Field(default_factory=dict)
+    faults_until_s: float = Field(default=60.0, ge=1.0, le=3600.0)
 
 
 class CampaignTable(BaseModel):

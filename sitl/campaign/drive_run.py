@@ -31,7 +31,7 @@ from sitl.experiments.experiment import GUARD
 from sitl.experiments.off_model import off_model
 from sitl.experiments.person import Person
 from sitl.experiments.time_bound import time_bound_s
-from sitl.generators.made_ground import MadeGround, NoWayError, made
+from sitl.generators.made_ground import MadeGround, NoWayError
 from sitl.lockstep import Drive, Report, TrackPoint
 from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_faults, with_sensors
 from sitl.simulator import ROOM_REACH_M
@@ -156,7 +156,7 @@ def mission_of(spec: RunSpec, folder: Path) -> Mission:
 def _ground_of(world: str, seed: int) -> MadeGround | None:
     """None: a mission's file says where it is driven. Kept, for the same ground's next run. Raises NoWayError."""
     ground = GroundSpec.of(world)
-    return None if ground is None else made(ground.kind, seed, ground.given, ground.movers)
+    return None if ground is None else ground.made(seed)
 
 
 def _mission_on(ground: MadeGround | None, spec: RunSpec, folder: Path) -> Mission:

@@ -24,7 +24,6 @@ from sitl.campaign.run_spec import RunResult
 from sitl.campaign.summary import Runs, labels
 from sitl.campaign.worded import GroundSpec
 from sitl.experiments import drawing
-from sitl.generators.made_ground import made
 from sitl.scenario import scenario_from_mission
 from sitl.world.world import World
 
@@ -61,7 +60,7 @@ def heat_maps(campaign: CampaignTable, runs: Runs, folder: Path) -> list[tuple[s
             maps.append((f"{name}: mean over the runs", _heat_map(stage, name, _panels(campaign, own))))
             continue
         for seed, what in shown_seeds(own).items():
-            there = made(ground.kind, seed, ground.given, ground.movers)
+            there = ground.made(seed)
             of_seed = [one for one in own if one[0].seed == seed]
             figure = _heat_map(_Stage(there.world, there.start_m), f"{name}, seed {seed}", _panels(campaign, of_seed))
             maps.append((f"{name}, seed {seed}: {what}", figure))

@@ -18,6 +18,7 @@ from companion.storage.validation import describe_first
 from sitl.faults.fault_file import FaultFileError, fault_of, load_faults
 from sitl.faults.plan import FaultPlan
 from sitl.generators.kinds import Parameters, is_kind, parameters_of
+from sitl.generators.made_ground import ACROSS_M, NEAREST_TARGET_M, MadeGround, made
 from sitl.sensors.range_sensors import SensorSuite
 from sitl.sensors.suites import suite_of
 
@@ -76,6 +77,7 @@ class GroundSpec:
     kind: str
     given: Parameters
     movers: int = 0
+    target_east_m: float = ACROSS_M
 
     @classmethod
     def of(cls, text: str) -> GroundSpec | None:
@@ -89,7 +91,14 @@ class GroundSpec:
         movers = values.pop("movers", 0)
         if not isinstance(movers, int) or not 0 <= movers <= MOST_MOVERS:
             raise ValueError(f"movers={movers}: give a whole number from 0 to {MOST_MOVERS}")
-        return cls(kind, _valid(parameters_of(kind), values), movers)
+        east_m = values.pop("target_east_m", ACROSS_M)
+        if isinstance(east_m, bool | str) or not NEAREST_TARGET_M <= east_m <= ACROSS_M:
+            raise ValueError(f"target_east_m={east_m}: give metres from {NEAREST_TARGET_M:g} to {ACROSS_M:g}")
+        return cls(kind, _valid(parameters_of(kind), values), movers, float(east_m))
+
+    def made(self, seed: int) -> MadeGround:
+        """The ground of a seed. Raises NoWayError, OwnPartError."""
+        return made(self.kind, seed, self.given, self.movers, self.target_east_m)
 
 
 class SensorChanges(Table):

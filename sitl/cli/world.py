@@ -18,7 +18,7 @@ from companion.storage.files import open_file
 from companion.storage.validation import alike, describe_first
 from sitl.generators.canvas import FINE_M
 from sitl.generators.kinds import GroundKind, Parameters, is_kind, parameters_of
-from sitl.generators.made_ground import MadeGround, NoWayError, made
+from sitl.generators.made_ground import ACROSS_M, NEAREST_TARGET_M, MadeGround, NoWayError, made
 from sitl.generators.measures import Difficulty
 
 app = typer.Typer(add_completion=False, name="world", help="Worlds from seeds.", no_args_is_help=True)
@@ -47,6 +47,9 @@ def make(
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the kind; may be repeated.")
     ] = None,
     movers: Annotated[int, typer.Option(min=0, max=50, help="So many things drive to and fro across the way.")] = 0,
+    target_east_m: Annotated[
+        float, typer.Option(min=NEAREST_TARGET_M, max=ACROSS_M, help="So far east of the start the target lies.")
+    ] = ACROSS_M,
     out: Annotated[Path, typer.Option(help="Folder for the mission and its world.")] = Path("out/worlds"),
     image: Annotated[Path | None, typer.Option(help="Draw it, with the shortest way.")] = None,
 ) -> None:
@@ -60,7 +63,7 @@ def make(
         mission = out / f"{kind.replace(':', '-')}-{seed}.toml"
         apart((image,), (mission, mission.with_suffix(".png")))
         writable(mission)
-        ground = made(kind, seed, given, movers)
+        ground = made(kind, seed, given, movers, target_east_m)
         measures = ground.difficulty
         files = {
             mission.with_suffix(".png"): _world(ground),

@@ -22,6 +22,10 @@ from sitl.world.world_file import movers_of
 
 END_M = 4.0
 """Nothing stands within this of the two ends."""
+START_EAST_M = 3.0
+ACROSS_M = EAST_M - 2.0 * START_EAST_M
+"""From the start east to the target, without a word."""
+NEAREST_TARGET_M = 6.0
 MOST_DRAWN = 60
 GROUND_STREAM, MOVER_STREAM = 51, 52
 ROOM_M, WALL_M = 7.0, 1.0
@@ -56,10 +60,13 @@ class MadeGround:
         return measured(solid, side_m, self.way_m, shortest_m(weights, self.start_m, self.goal_m))
 
 
-def made(kind: str, seed: int, given: Parameters | None = None, movers: int = 0) -> MadeGround:
+def made(
+    kind: str, seed: int, given: Parameters | None = None, movers: int = 0, target_east_m: float = ACROSS_M
+) -> MadeGround:
     """The ground of a seed; drawn again until there is a way with the kind's room on both sides.
 
     ``given``: the kind's parameters; None: as they are without a word. ``movers``: things that drive to and fro.
+    ``target_east_m``: so far east of the start the target lies, and at most as far to its side.
     Raises NoWayError, and OwnPartError for a kind of one's own that draws no ground.
     """
     parameters = given or parameters_of(kind)()
@@ -71,8 +78,10 @@ def made(kind: str, seed: int, given: Parameters | None = None, movers: int = 0)
             raise OwnPartError(f"world {kind!r:.80} draws {type(solid).__name__}; begin with empty(), and return it")
         if solid.shape != empty().shape or solid.dtype != np.bool_:
             raise OwnPartError(f"world {kind!r:.80} draws {solid.dtype} of shape {solid.shape}; begin with empty()")
-        start_m = float(rng.uniform(END_M, NORTH_M - END_M)), 3.0
-        goal_m = float(rng.uniform(END_M, NORTH_M - END_M)), EAST_M - 3.0
+        start_m = float(rng.uniform(END_M, NORTH_M - END_M)), START_EAST_M
+        goal_north_m = float(rng.uniform(END_M, NORTH_M - END_M))
+        goal_north_m = min(max(goal_north_m, start_m[0] - target_east_m), start_m[0] + target_east_m)
+        goal_m = goal_north_m, START_EAST_M + target_east_m
         with blamed(OwnKind.WORLD, kind):
             solid = with_ends(parameters.between(solid, start_m, goal_m, rng), start_m, goal_m)
         way_m = cheapest_way(weights_with(coarse(solid), parameters.beside_m), start_m, goal_m)

@@ -80,8 +80,6 @@ SENSORS = (
     Gene(SearchPart.SENSORS, "latency_s", 0.0, 0.2, 0.0),
     Gene(SearchPart.SENSORS, "max_m", 3.0, 12.0, 8.0),
 )
-STARTS_S = (0.0, 60.0)
-"""From when the rover begins to drive."""
 RARELY = 0.5
 """Up to this share a fault does not happen: with all kinds at once no run would show anything."""
 
@@ -96,11 +94,6 @@ class MovedFault:
     harm: str
     bounds: Mapping[str, tuple[float, float]]
     fixed: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def keys(self) -> dict[str, tuple[float, float]]:
-        """All bounds."""
-        return {"start_s": STARTS_S, **self.bounds}
 
 
 FAULTS = {
@@ -137,7 +130,7 @@ def genes_of(campaign: CampaignTable, base: RunSpec) -> tuple[Gene, ...]:
         SearchPart.TRAFFIC: _of_traffic(base.world),
         SearchPart.ROVER: tuple(replace(gene, usual=getattr(base, gene.name)) for gene in ROVER),
         SearchPart.SENSORS: _of_sensors(base.sensors),
-        SearchPart.FAULTS: _of_faults(),
+        SearchPart.FAULTS: _of_faults(campaign.search.faults_until_s),
         SearchPart.SETTINGS: _of_settings(campaign, base),
     }
     return tuple(gene for part in campaign.search.parts for gene in groups[part])
@@ -192,11 +185,12 @@ def _of_sensors(sensors: str) -> tuple[Gene, ...]:
     return tuple(replace(gene, usual=given.get(gene.name, gene.usual)) for gene in SENSORS)
 
 
-def _of_faults() -> tuple[Gene, ...]:
+def _of_faults(until_s: float) -> tuple[Gene, ...]:
+    """They begin from when the rover begins to drive until ``until_s`` later."""
     return tuple(
         Gene(SearchPart.FAULTS, f"{kind}.{key}", low, high, low, rarely=RARELY if key == one.harm else 0.0)
         for kind, one in FAULTS.items()
-        for key, (low, high) in one.keys.items()
+        for key, (low, high) in {"start_s": (0.0, until_s), **one.bounds}.items()
     )
 
 
@@ -228,6 +222,7 @@ def _faults_in_words(base: str, values: Values) -> str:
     pieces = [] if base == NOTHING else [base]
     for kind, one in FAULTS.items():
         if f"{kind}.{one.harm}" in values:
-            given = {key: values.get(f"{kind}.{key}", bounds[0]) for key, bounds in one.keys.items()}
+            lows = {"start_s": 0.0, **{key: low for key, (low, _) in one.bounds.items()}}
+            given = {key: values.get(f"{kind}.{key}", low) for key, low in lows.items()}
             pieces.append(str(Worded(kind, {**given, **one.fixed, "since": "driving"})))
     return f"{BETWEEN_FAULTS} ".join(pieces) or NOTHING

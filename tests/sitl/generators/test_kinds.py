@@ -14,7 +14,7 @@ from companion.mission.load import load_mission
 from sitl.cli.commands import app
 from sitl.generators.canvas import EAST_M, FINE_M, NORTH_M, disc, empty
 from sitl.generators.kinds import KINDS, Forest, GroundKind, Maze, Rooms, Yard
-from sitl.generators.made_ground import MadeGround, NoWayError, made
+from sitl.generators.made_ground import ACROSS_M, MadeGround, NoWayError, made
 from sitl.generators.shortest_way import BODY_M
 from sitl.scenario import scenario_from_mission
 from sitl.world.world import World
@@ -31,6 +31,15 @@ def test_a_seed_gives_one_world_with_a_way(kind: GroundKind) -> None:
         assert np.hypot(*(places_m - place).T).min() >= BODY_M
     assert np.hypot(*(one.way_m[0] - one.start_m)) < 0.3 and np.hypot(*(one.way_m[-1] - one.goal_m)) < 0.3
     assert np.hypot(*np.diff(one.way_m, axis=0).T).max() < 0.3
+
+
+@pytest.mark.parametrize("kind", list(GroundKind))
+def test_a_target_may_lie_nearer_on_the_same_ground(kind: GroundKind) -> None:
+    for seed in range(3):
+        far, near = made(kind, seed), made(kind, seed, target_east_m=10.0)
+        assert near.goal_m[1] - near.start_m[1] == 10.0 and abs(near.goal_m[0] - near.start_m[0]) <= 10.0
+        assert np.hypot(*(near.way_m[-1] - near.goal_m)) < 0.3
+        assert far.goal_m == made(kind, seed, target_east_m=ACROSS_M).goal_m
 
 
 def test_parameters_change_what_they_say() -> None:

@@ -90,8 +90,14 @@ def test_every_kind_of_fault_is_moved_that_a_campaigns_runs_can_have(share: floa
     assert all(fault.since == "driving" and fault.start_s <= 60.0 for fault in plan.faults)
 
 
+def test_faults_begin_as_late_as_the_campaign_says() -> None:
+    table = CAMPAIGN.model_copy(update={"search": SearchTable(parts=["faults"], faults_until_s=20.0)})
+    begins = [gene for gene in genes_of(table, base()) if gene.name.endswith(".start_s")]
+    assert len(begins) == len(FAULTS) and {(gene.low, gene.high) for gene in begins} == {(0.0, 20.0)}
+
+
 def test_a_sensor_may_be_silent_for_longer_than_a_rover_needs_to_stand() -> None:
-    assert FAULTS["sensor_silent"].keys["duration_s"][1] >= 2.0 * 2.9
+    assert FAULTS["sensor_silent"].bounds["duration_s"][1] >= 2.0 * 2.9
 
 
 def test_up_to_half_of_its_share_a_fault_does_not_happen() -> None:
