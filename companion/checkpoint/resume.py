@@ -274,7 +274,7 @@ def _in_frame(place: SavedPlace, saved_origin: GeoPoint, origin: GeoPoint) -> Ne
 def _map_newest_scan(executor: MissionExecutor, vehicle: VehicleState) -> None:
     """A rover that still moves is beyond the ground seen when the state was saved: a scan must come first."""
     seen, attitude = vehicle.scan_ahead, vehicle.attitude
-    pose = None if seen is None else vehicle.pose_at(seen.time_s)
+    pose = None if seen is None else vehicle.pose_at(vehicle.seen_s(seen))
     if seen is not None and attitude is not None and pose is not None:
         executor.map_scan(pose, attitude.yaw_rate_rad_s, seen.scan)
 

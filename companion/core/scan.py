@@ -44,11 +44,11 @@ class RangeScan:
     """So far a ray that met nothing is known to be free, if that is less than ``max_range_m``; 0: there are none."""
     origin_m: tuple[float, float] = (0.0, 0.0)
     """Where the rays begin: metres forward and right of the rover's middle. Readings still count from the middle."""
-
-    came_s: float | None = None
-    """When it would have come without the jitter of its way, by the sensor's own clock; None: as ``time_s``."""
-    late_s: float = 0.0
-    """How late it came by the sensor's own clock, compared with the best moment of the run; 0 if it tells none."""
+    told_s: float | None = None
+    """The time that the sender has written into it, by a clock of its own."""
+    late_s: float | None = None
+    """How late it came by the sensor's own clock; None: nobody knows. Over MAVLink compared with the best of the last
+    one to two seconds (``ArrivalJitter``), of a wired lidar with the best of the run (``DeviceClock``)."""
 
     @property
     def sight_m(self) -> float:

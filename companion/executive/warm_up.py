@@ -39,6 +39,7 @@ from companion.settings import Settings
 from companion.settings.settings_file import by_points
 from companion.vehicle.commands import GuidedVelocity
 from companion.vehicle.events import AttitudeSeen
+from companion.vehicle.state import VehicleState
 
 COMPILING = "compiling, once on this machine: about a minute, several on a Raspberry Pi"
 """Shown before a ``warm_up`` that has something to compile."""
@@ -79,7 +80,7 @@ def _age_of_ranges(view: RangeScan) -> None:
     """Two scans, of a rover that begins to turn."""
     ages, far = RangeAges(), replace(view, bearing_rad=np.linspace(-0.5, 0.5, FEW), range_m=np.full(FEW, 2.0))
     for time_s, rate_rad_s in ((0.0, 0.0), (1.0, 0.0), (2.0, 1.0)):
-        ages.hear(AttitudeSeen(time_s, time_s, 0.0, rate_rad_s))
+        ages.hear(VehicleState(attitude=AttitudeSeen(time_s, time_s, 0.0, rate_rad_s)))
         ages.note(far, Pose(4.0, 4.0, 0.0, time_s), 0.0, rate_rad_s)
 
 

@@ -1,5 +1,7 @@
 """A lidar's own clock: how late its bytes come, compared with the best moment of the run.
 
+So a line that is late for good is noticed; what varies on the way of messages is ``ArrivalJitter``.
+
 Nouns: device clock.
 """
 

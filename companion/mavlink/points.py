@@ -126,5 +126,5 @@ def _told(one: _Open, key: tuple[int, int]) -> RangeScan | None:
     bearing_rad = (np.arange(SECTORS, dtype=np.float64) + 0.5) * SECTOR_RAD - math.pi
     limits = (one.look.min_m, one.look.max_m)
     sender, kind = key
-    source = f"obstacle points {kind}"
-    return RangeScan(one.heard_s, bearing_rad[part], one.range_m[part].copy(), *limits, SECTOR_RAD, source, sender)
+    range_m, source, told_s = one.range_m[part].copy(), f"obstacle points {kind}", one.look.stamp_ms * 1e-3
+    return RangeScan(one.heard_s, bearing_rad[part], range_m, *limits, SECTOR_RAD, source, sender, told_s=told_s)

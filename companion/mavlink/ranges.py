@@ -84,23 +84,15 @@ class RangeDecoder:
             return self._with_place(self._points.add(message, time_s, sender), finer=True)
         if number == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE:
             seen = obstacle_distance(message, time_s, sender)
-            return self._with_place(seen and self._timed(seen, message.time_usec * 1e-6), finer=True)
+            return self._with_place(seen, finer=True)
         sector = sender == AUTOPILOT and is_sector(message)
         scan = distance_sensor(message, time_s, sender, sector=sector)
         if scan is None or (sector and self._is_echo(message.orientation, scan)):
             return None
-        scan = self._with_place(self._timed(scan, message.time_boot_ms * 1e-3), coarse=sector)
+        scan = self._with_place(scan, coarse=sector)
         if scan is not None and not sector:
             self._beam_s[message.orientation] = time_s
         return scan
-
-    def _timed(self, scan: RangeScan, told_s: float) -> RangeScan:
-        """The scan without the jitter of its way, by the time in its message."""
-        if len(self._jitter) > MOST_SCANS:
-            self._jitter.clear()
-        jitter = self._jitter.get(sensor_of(scan), ArrivalJitter()).after(scan.time_s, told_s)
-        self._jitter[sensor_of(scan)] = jitter
-        return replace(scan, came_s=jitter.came_s(scan.time_s, told_s))
 
     def complete(self, time_s: float) -> list[RangeScan]:
         """The scans of points whose look is complete at the first bytes of a later time."""
@@ -108,7 +100,7 @@ class RangeDecoder:
         return [scan for scan in whole if scan is not None]
 
     def _with_place(self, scan: RangeScan | None, *, finer: bool = False, coarse: bool = False) -> RangeScan | None:
-        """The scan, if there is a place for its sensor; notes what it tells about echoes.
+        """The scan, if there is a place for its sensor, and how late it came; notes what it tells about echoes.
 
         ``finer``: it is as fine as a lidar's; ``coarse``: it is a sector.
         """
@@ -119,7 +111,15 @@ class RangeDecoder:
             self._lidar_s = scan.time_s
         if not coarse:
             self._seen_s.update((octant, scan.time_s) for octant in _octants(scan))
-        return scan
+        return self._timed(scan)
+
+    def _timed(self, scan: RangeScan) -> RangeScan:
+        """The scan with how late it came, by the time in its message."""
+        if scan.told_s is None:
+            return scan
+        jitter = self._jitter.get(sensor_of(scan), ArrivalJitter()).after(scan.time_s, scan.told_s)
+        self._jitter[sensor_of(scan)] = jitter
+        return replace(scan, late_s=jitter.late_s(scan.time_s, scan.told_s))
 
     def _is_echo(self, orientation: int, sector: RangeScan) -> bool:
         """Whether a proximity sector only repeats finer data, of a lidar or a rangefinder that faces the same way.
@@ -136,6 +136,7 @@ class RangeDecoder:
         """Whether there is a place for this sensor; if so, it takes it."""
         if sensor not in self._heard_s and len(self._heard_s) >= MOST_SCANS:
             self._heard_s = {one: heard_s for one, heard_s in self._heard_s.items() if time_s - heard_s < FORGOTTEN_S}
+            self._jitter = {one: jitter for one, jitter in self._jitter.items() if one in self._heard_s}
             if len(self._heard_s) >= MOST_SCANS:
                 return False
         self._heard_s[sensor] = time_s
@@ -167,6 +168,7 @@ def distance_sensor(message: Any, time_s: float, sender: int = AUTOPILOT, *, sec
         SECTOR_RAD if sector else width_rad,
         f"{'sector' if sector else 'distance sensor'} {message.id}",
         sender,
+        message.time_boot_ms * 1e-3,
     )
 
 
@@ -193,6 +195,7 @@ def obstacle_distance(message: Any, time_s: float, sender: int = AUTOPILOT) -> R
         math.radians(abs(step_deg)),
         "obstacle distance",
         sender,
+        message.time_usec * 1e-6,
     )
 
 
@@ -240,13 +243,15 @@ def _scan(
     width_rad: float,
     source: str,
     sender: int = AUTOPILOT,
+    told_s: float | None = None,
 ) -> RangeScan:
     beams = max(1, math.ceil(width_rad / NARROW_RAD - 1e-9))
     if beams > 1:
         offsets = ((np.arange(beams) + 0.5) / beams - 0.5) * width_rad
         bearing_rad = (bearing_rad[:, None] + offsets).ravel()
         range_m = np.repeat(range_m, beams)
-    return RangeScan(time_s, bearing_rad, range_m, min_range_m, max_range_m, width_rad / beams, source, sender)
+    width_rad /= beams
+    return RangeScan(time_s, bearing_rad, range_m, min_range_m, max_range_m, width_rad, source, sender, told_s=told_s)
 
 
 def _octants(scan: RangeScan) -> set[int]:

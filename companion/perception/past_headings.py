@@ -16,24 +16,33 @@ from companion.vehicle.events import AttitudeSeen
 Floats = NDArray[np.float64]
 
 KEPT_S = 1.0
+ANEW_S = 0.5
+"""More than what waits on the way can be out of order."""
 
 
 class PastHeadings:
-    """Of each attitude that came, as a number that does not jump where a circle begins anew."""
+    """Of each attitude, as a number that does not jump where a circle begins anew."""
 
     def __init__(self) -> None:
         self._past: deque[tuple[float, float]] = deque()
         self._rate_rad_s = 0.0
+        self._noted: AttitudeSeen | None = None
 
-    def note(self, attitude: AttitudeSeen | None) -> None:
-        """The last attitude; nothing new is no matter. One that came earlier than the last begins anew."""
-        if attitude is None or (self._past and attitude.time_s == self._past[-1][0]):
+    def note(self, attitude: AttitudeSeen, came_s: float) -> None:
+        """The last attitude, and when it came without the jitter of its way; the same one again is no matter.
+
+        One that is not later than the last is left out; one that is earlier by far begins anew.
+        """
+        if attitude is self._noted:
             return
-        if self._past and attitude.time_s < self._past[-1][0]:
+        self._noted = attitude
+        if self._past and came_s < self._past[-1][0] - ANEW_S:
             self._past.clear()
+        if self._past and came_s <= self._past[-1][0]:
+            return
         before_rad = self._past[-1][1] if self._past else attitude.heading_rad
         turned_rad = math.remainder(attitude.heading_rad - before_rad, 2.0 * math.pi)
-        self._past.append((attitude.time_s, before_rad + turned_rad))
+        self._past.append((came_s, before_rad + turned_rad))
         self._rate_rad_s = attitude.yaw_rate_rad_s
         while self._past[-1][0] - self._past[0][0] > KEPT_S:
             self._past.popleft()

@@ -24,7 +24,7 @@ from companion.core.frames import Pose
 from companion.core.scan import WIRED, RangeScan
 from companion.perception.past_headings import PastHeadings
 from companion.perception.scan_filter import Sensor, sensor_of
-from companion.vehicle.events import AttitudeSeen
+from companion.vehicle.state import VehicleState
 
 Floats = NDArray[np.float64]
 
@@ -99,9 +99,10 @@ class RangeAges:
         for sensor, age_s in found:
             self._voices.setdefault(sensor, _Voice()).age_s = age_s
 
-    def hear(self, attitude: AttitudeSeen | None) -> None:
-        """The last attitude, after each event."""
-        self._headings.note(attitude)
+    def hear(self, vehicle: VehicleState) -> None:
+        """The vehicle after each event: its last attitude counts."""
+        if vehicle.attitude is not None:
+            self._headings.note(vehicle.attitude, vehicle.came_s(vehicle.attitude))
 
     def age_s(self, scan: RangeScan) -> float:
         """How old the scan was when it came; 0 as long as nothing else is known."""

@@ -35,7 +35,7 @@ class LidarMonitor(Monitor):
         """One more event."""
         if isinstance(event, RangeSeen) and event.scan.sender == WIRED:
             self._heard_s[event.scan.source] = event.time_s
-            if event.scan.late_s <= LATE_S:
+            if (event.scan.late_s or 0.0) <= LATE_S:
                 self._on_time_s[event.scan.source] = event.time_s
             if event.scan.tells:
                 self._saw_s[event.scan.source] = event.time_s

@@ -53,11 +53,6 @@ class Heard:
         return [*filter(_is_no_last_resort, events), *self._lidars.poll(now_s)]
 
 
-def _came_s(event: RangeSeen) -> float:
-    """When a scan came, without the jitter of its way."""
-    return event.time_s if event.scan.came_s is None else event.scan.came_s
-
-
 def _is_no_last_resort(event: Event) -> bool:
     return not isinstance(event, RangeSeen) or event.scan.source != NEAREST_OF_ALL
 
@@ -91,7 +86,7 @@ class EventDispatcher:
         for event in newest_ranges(self._heard.poll(now_s)):
             run.vehicle = fold(run.vehicle, event)
             if run.executor is not None:
-                run.executor.range_ages.hear(run.vehicle.attitude)
+                run.executor.range_ages.hear(run.vehicle)
             self._note_text(event)
             for handler in self._handlers:
                 handler.take(event, run.vehicle)
@@ -109,18 +104,15 @@ class EventDispatcher:
         """The scan where it was taken; None when that is doubtful.
 
         One whose readings have ages is brought to the rover's place of now. One over MAVLink has the age of the
-        settings, or that which was found, and lies where the rover was then. The position comes over the link, and is
-        half a round trip old when it does. What comes over the same link is as late, and a lidar of the companion's
-        own is not.
+        settings, or that which was found, and lies where the rover was then.
         """
         if not self._scans.fits or self._localization.position_doubted:
             return None
-        vehicle, scan, at_s = self._run.vehicle, event.scan, _came_s(event)
-        if scan.age_s is not None:
-            scan, at_s = replace(scan, age_s=scan.age_s + (now_s - event.time_s)), now_s
-        if scan.sender == WIRED:
-            at_s += 0.5 * vehicle.latency_s
-        pose, attitude = vehicle.pose_at(at_s), vehicle.attitude
+        vehicle = self._run.vehicle
+        if event.scan.age_s is not None:
+            event = RangeSeen(now_s, replace(event.scan, age_s=event.scan.age_s + (now_s - event.time_s)))
+        scan, attitude = event.scan, vehicle.attitude
+        pose = vehicle.pose_at(vehicle.seen_s(event))
         if pose is None or attitude is None:
             return None
         ages = executor.range_ages
@@ -135,7 +127,7 @@ class EventDispatcher:
         if set_s is not None:
             return set_s
         vehicle, scan = self._run.vehicle, event.scan
-        pose = vehicle.pose_at(_came_s(event))
+        pose = vehicle.pose_at(vehicle.seen_s(event))
         if pose is not None and vehicle.attitude is not None:
             ages.note(scan, pose, vehicle.forward_m_s, vehicle.attitude.yaw_rate_rad_s)
         age_s = ages.age_s(scan)

@@ -51,7 +51,12 @@ class Latency:
     @property
     def longest_s(self) -> float:
         """For choosing the speed: the longest of the newest round trips; the delay to the companion if that is more."""
-        return max((*self.round_trips_s, self.growth_s))
+        return max(self.round_trip_s, self.growth_s)
+
+    @property
+    def round_trip_s(self) -> float:
+        """The longest of the newest round trips."""
+        return max(self.round_trips_s, default=0.0)
 
     @property
     def lasting_s(self) -> float:

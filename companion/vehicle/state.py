@@ -12,6 +12,7 @@ from enum import Enum
 from companion.core.arrival_jitter import MOST_S, ArrivalJitter
 from companion.core.changed import changed
 from companion.core.frames import Pose
+from companion.core.scan import WIRED
 from companion.vehicle import guard
 from companion.vehicle.auto_leg import GuidedLeg, LegState, leg_after, leg_at_heartbeat
 from companion.vehicle.dead_reckoning import Drift, Reckoning, drift_after, jump_m, reckoning_after
@@ -54,9 +55,9 @@ PARAMETERS_KEPT = frozenset((*FENCE, "WP_RADIUS", *LIMITS, *THROTTLE_SCALE))
 FIRST_BATTERY = 0
 OTHERS_KEPT = 64
 OTHERS_FORGOTTEN_S = 30.0
+"""Other vehicles are kept for this long after their last message, and no more than OTHERS_KEPT of them."""
 WIDER_S = 1.0
 """So long a wide scan stands before those of single beams that look the same way."""
-"""Other vehicles are kept for this long after their last message, and no more than OTHERS_KEPT of them."""
 
 
 class EkfQuantity(Enum):
@@ -141,7 +142,23 @@ class VehicleState:
 
     def _since_s(self, report: LocalPositionSeen | AttitudeSeen, time_s: float) -> float:
         """The time since a report; below 0 before it."""
-        return min(max(time_s - self.jitter.came_s(report.time_s, report.boot_s), -MOST_S), 0.5)
+        return min(max(time_s - self.came_s(report), -MOST_S), 0.5)
+
+    def came_s(self, report: LocalPositionSeen | AttitudeSeen) -> float:
+        """When a report would have come without the jitter of its way; when it came where that is not known."""
+        return report.time_s - (self.jitter.late_s(report.time_s, report.boot_s) or 0.0)
+
+    def seen_s(self, seen: RangeSeen) -> float:
+        """When the rover was where it got a scan, by when its positions come.
+
+        What comes over the link is as late as they are but for the jitter; a scan whose own jitter is not known has
+        waited as the last position did. A lidar of the companion's own is not late: positions are, by half a round trip
+        at least.
+        """
+        waited_s = 0.0 if self.position is None else self.position.time_s - self.came_s(self.position)
+        if seen.scan.sender == WIRED:
+            return seen.time_s + max(0.5 * self.latency_s - waited_s, 0.5 * self.latency.round_trip_s)
+        return seen.time_s - (waited_s if seen.scan.late_s is None else seen.scan.late_s)
 
     @property
     def speed_m_s(self) -> float:

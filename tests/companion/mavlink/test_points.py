@@ -156,3 +156,12 @@ def test_any_values_are_survived(payloads: list[bytes]) -> None:
         check = int(mavlink.x25crc(head + payload + bytes([kind.crc_extra])).crc)
         for scan in ear.scans(b"\xfd" + head + payload + check.to_bytes(2, "little"), 10.0 + 0.05 * number):
             assert len(scan.range_m) == len(scan.bearing_rad) > 0 and 0.0 <= scan.min_range_m < scan.max_range_m
+
+
+def test_looks_that_wait_on_their_way_are_late_by_their_own_clock() -> None:
+    listener, late_s = Listener(), []
+    for number in range(60):
+        made_s, waited_s = 0.1 * number, 0.06 if number % 4 == 3 else 0.0
+        raw = b"".join(point(round(1e3 * made_s), 2.0, aside_m) for aside_m in (-0.5, 0.5))
+        late_s += [scan.late_s for scan in listener.scans(raw, 10.0 + made_s + waited_s)]
+    assert late_s[35:] == pytest.approx([0.06 if number % 4 == 3 else 0.0 for number in range(59)][35:], abs=0.002)

@@ -7,6 +7,7 @@ import pytest
 
 from companion.core.scan import RangeScan
 from companion.mavlink.codec import Codec
+from companion.perception.scan_filter import MOST_SCANS
 from companion.settings import LinkSettings
 from companion.vehicle.events import RangeSeen
 from tests.support.mavlink_vehicle import Station
@@ -51,7 +52,18 @@ def test_scans_that_wait_on_their_way_would_have_come_sooner_by_their_own_clock(
             (scan,) = listener.scans(raw, 10.0 + made_s + waited_s)
             assert scan.time_s == 10.0 + made_s + waited_s
             if number > 20:
-                assert scan.came_s == pytest.approx(10.0 + made_s, abs=0.002)
+                assert scan.late_s == pytest.approx(waited_s, abs=0.002)
+
+
+def test_one_sensor_too_many_does_not_matter_to_the_others(listener: Listener) -> None:
+    late_s = []
+    for number in range(60):
+        made_s, waited_s = 0.1 * number, 0.08 if number % 4 == 3 else 0.0
+        for sensor in range(MOST_SCANS + 3):
+            raw = listener.rover.distance(350, 0, sensor_id=100 + sensor, time_boot_ms=round(1e3 * made_s))
+            late_s += [(number, waited_s, one.late_s) for one in listener.scans(raw, 10.0 + made_s + waited_s)]
+    assert len(late_s) == 60 * MOST_SCANS
+    assert all(late == pytest.approx(waited_s, abs=0.002) for number, waited_s, late in late_s if number > 30)
 
 
 @pytest.mark.parametrize("orientation", [8, 12, 24, 25, 99])

@@ -14,7 +14,7 @@ from companion.vehicle.events import AttitudeSeen
 def heard(*headings: tuple[float, float], rate_rad_s: float = 0.0) -> PastHeadings:
     past = PastHeadings()
     for time_s, heading_rad in headings:
-        past.note(AttitudeSeen(time_s, time_s, heading_rad, rate_rad_s))
+        past.note(AttitudeSeen(time_s, time_s, heading_rad, rate_rad_s), time_s)
     return past
 
 
@@ -39,8 +39,15 @@ def test_after_the_last_attitude_it_turns_on_and_before_the_first_it_had_not() -
 def test_nothing_heard_is_no_turn_and_what_is_heard_again_is_no_matter() -> None:
     assert turned_rad(PastHeadings(), 1.0, 0.2) == [0.0]
     past = heard((1.0, 0.0), (1.0, 0.0), (1.1, 0.1), (1.1, 0.1))
-    past.note(None)
     assert turned_rad(past, 1.1, 0.1) == pytest.approx([0.1])
+
+
+def test_an_attitude_counts_from_when_it_would_have_come() -> None:
+    """Three of one tick, of which two have waited; one that seems to have come before the last is left out."""
+    past = PastHeadings()
+    for came_s, heading_rad in ((1.0, 0.0), (1.05, 0.05), (1.1, 0.1), (1.08, 0.5)):
+        past.note(AttitudeSeen(1.1, came_s, heading_rad, 1.0), came_s)
+    assert turned_rad(past, 1.1, 0.05, 0.1) == pytest.approx([0.05, 0.1])
 
 
 def test_a_clock_that_goes_back_begins_anew_and_the_past_is_short() -> None:

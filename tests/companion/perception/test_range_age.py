@@ -17,6 +17,7 @@ from companion.core.frames import Pose
 from companion.core.scan import WIRED, RangeScan
 from companion.perception.range_age import LEAST_S, RangeAges
 from companion.vehicle.events import AttitudeSeen
+from companion.vehicle.state import VehicleState
 from tests.support.quick import examples
 
 BEARINGS_RAD = np.radians(np.arange(0.0, 360.0, 5.0))
@@ -63,7 +64,7 @@ def found_s(
         then = at - round(old_s / (PERIOD_S / 10.0))
         scan = scan_at(times_s[then], turns(times_s[then])[0], places[then], noise_m)
         for time_s in (times_s[at] - 0.5 * PERIOD_S, times_s[at]):
-            ages.hear(AttitudeSeen(time_s, time_s, *turns(time_s)))
+            ages.hear(VehicleState(attitude=AttitudeSeen(time_s, time_s, *turns(time_s))))
         heading_rad, rate_rad_s = turns(times_s[at])
         scan = replace(scan, time_s=times_s[at], **changes)
         ages.note(scan, Pose(*places[at], heading_rad, times_s[at]), rolls_m_s, rate_rad_s)
@@ -99,7 +100,7 @@ def test_each_sensor_has_its_own() -> None:
     ages = RangeAges()
     for time_s in np.arange(1.0, 7.0, PERIOD_S):
         heading_rad, rate_rad_s = to_and_fro(time_s)
-        ages.hear(AttitudeSeen(time_s, time_s, heading_rad, rate_rad_s))
+        ages.hear(VehicleState(attitude=AttitudeSeen(time_s, time_s, heading_rad, rate_rad_s)))
         for sensor, age_s in (("young", 0.0), ("old", 0.2)):
             scan = scan_at(time_s, to_and_fro(time_s - age_s)[0], (0.0, 0.0))
             scan = replace(scan, source=sensor)
@@ -130,7 +131,7 @@ def compared(ages: RangeAges, age_s: float, since_s: float, until_s: float, peri
     found = []
     for time_s in np.arange(since_s, until_s, period_s):
         heading_rad, rate_rad_s = to_and_fro(time_s)
-        ages.hear(AttitudeSeen(time_s, time_s, heading_rad, rate_rad_s))
+        ages.hear(VehicleState(attitude=AttitudeSeen(time_s, time_s, heading_rad, rate_rad_s)))
         scan = scan_at(time_s, to_and_fro(time_s - age_s)[0], (0.0, 0.0))
         ages.note(scan, Pose(0.0, 0.0, heading_rad, time_s), 0.0, rate_rad_s)
         found.append(ages.age_s(scan))

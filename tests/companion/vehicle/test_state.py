@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from companion.core.arrival_jitter import ArrivalJitter
 from companion.core.frames import GeoPoint
-from companion.core.scan import RangeScan
+from companion.core.scan import WIRED, RangeScan
 from companion.mission.autopilot_fence import PARAMETERS
 from companion.vehicle.events import (
     AckSeen,
@@ -25,6 +26,7 @@ from companion.vehicle.events import (
     TextSeen,
     ThrottleSeen,
 )
+from companion.vehicle.link_latency import Latency
 from companion.vehicle.state import PARAMETERS_KEPT, EkfQuantity, VehicleState, fold
 
 PLACE = GeoPoint(-35.0, 149.0)
@@ -148,6 +150,46 @@ def test_reports_that_wait_on_their_way_do_not_move_the_pose() -> None:
             off_m.append(pose.north_m - 2.0 * (time_s - 30.0))
             assert pose.heading_rad == pytest.approx(0.5 * (time_s - 30.0), abs=0.005)
     assert np.ptp(off_m) < 0.015, "0.2 m, were each taken for new when it comes"
+
+
+def seen_at(time_s: float, late_s: float | None, sender: int = 1) -> RangeSeen:
+    nothing = np.zeros(0)
+    return RangeSeen(time_s, RangeScan(time_s, nothing, nothing, 0.1, 8.0, 0.1, "test", sender, late_s=late_s))
+
+
+@pytest.mark.parametrize(("held_s", "off_m"), [(0.2, 0.02), (0.45, 0.02), (0.9, 0.02)])
+def test_a_scan_lies_where_it_was_taken_when_it_was_held_up_together_with_positions(
+    held_s: float, off_m: float
+) -> None:
+    """At 2 m/s all of a second is held up for a while. Its sensor tells no time, or one that is known to be as late."""
+    state, jitter, off = VehicleState(), ArrivalJitter(), []
+    for number in range(200):
+        made_s = 0.05 * number
+        time_s = 30.0 + max(made_s, 8.0 + held_s if 8.0 < made_s < 8.0 + held_s else 0.0)
+        state = fold(state, LocalPositionSeen(time_s, made_s, 2.0 * made_s, 0.0, 2.0, 0.0))
+        state = fold(state, AttitudeSeen(time_s, made_s, 0.0, 0.0))
+        jitter = jitter.after(time_s, 700.0 + made_s)
+        for late_s in (None, jitter.late_s(time_s, 700.0 + made_s)):
+            pose = state.pose_at(state.seen_s(seen_at(time_s, late_s)))
+            assert pose is not None
+            off.append(abs(pose.north_m - 2.0 * made_s))
+    assert max(off) < off_m, "in either case; new beside positions that have waited it was 0.5 m too far"
+
+
+def test_a_wired_lidar_is_not_put_too_far_when_the_link_is_later_from_now_on() -> None:
+    """By 0.2 s, before the next answer shows it: late positions count once, not as jitter and as latency."""
+    state, off_m = VehicleState(latency=Latency((0.04, 0.04, 0.04))), []
+    for number in range(240):
+        made_s = 0.05 * number
+        time_s = 30.0 + made_s + 0.02 + (0.2 if made_s > 8.0 else 0.0)
+        state = fold(state, LocalPositionSeen(time_s, made_s, 1.5 * made_s, 0.0, 1.5, 0.0))
+        state = fold(state, AttitudeSeen(time_s, made_s, 0.0, 0.0))
+        pose = state.pose_at(state.seen_s(seen_at(time_s, None, WIRED)))
+        assert pose is not None
+        off_m.append(pose.north_m - 1.5 * (time_s - 30.0))
+    assert max(off_m) < 0.01 and max(map(abs, off_m[:160])) < 0.01
+    assert min(off_m[:175]) > -0.05, "for a second, in which it is jitter"
+    assert off_m[-1] == pytest.approx(-0.18, abs=0.02), "half of what the next round trip will show"
 
 
 def test_no_pose_without_both_position_and_attitude() -> None:
