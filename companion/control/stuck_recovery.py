@@ -34,6 +34,8 @@ LINGERS_PER_M = 4.0
 PATIENT = 5.0
 """Motions planned without a guard have so many times longer: into a gap of 0.2 m more than its width a rover creeps a
 few centimetres a second."""
+ELSEWHERE_M = 2.0
+"""A rover that is stuck so far from where it was stuck before is stuck somewhere else."""
 TURNS_RAD_S, ROLLS_M_S = 0.3, 0.1
 """A rover that turns slower goes back straight; one that rolls ahead slower stands at once."""
 
@@ -55,6 +57,9 @@ class StuckRecovery:
         self._centres: dict[float, Pose] = {}  # of the circles, by radius
         self._back_until_s = -math.inf
         self._stuck_places: list[NedPoint] = []
+        self._here: NedPoint | None = None
+        self.times_here = 0
+        """How often it was stuck where it was stuck last."""
 
     def begin(self, pose: Pose) -> None:
         """From here and now on progress is expected."""
@@ -95,6 +100,9 @@ class StuckRecovery:
     def back_out(self, view: LocalView, ahead: NedPoint) -> None:
         """Remember the place ahead as costly, in the end as an obstacle, and from now on back out."""
         settings = view.settings.guidance
+        if self._here is None or view.pose.point.distance_m(self._here) >= ELSEWHERE_M:
+            self._here, self.times_here = view.pose.point, 0
+        self.times_here += 1
         self._stuck_places.append(ahead)
         near_m = min(SAME_PLACE_M, view.evidence.base.resolution_m)
         tries = sum(place.distance_m(ahead) <= near_m for place in self._stuck_places)

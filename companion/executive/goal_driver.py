@@ -183,6 +183,11 @@ class GoalDriver:
         """The rover stands still for a good reason: do not count it as stuck."""
         self._recovery.pause()
 
+    @property
+    def stuck_here(self) -> int:
+        """How often the rover was stuck where it was stuck last."""
+        return self._recovery.times_here
+
     def decide(self, view: LocalView, moving: tuple[Moving, ...] = ()) -> Decision | None:
         """The navigator's decision if there is a new one in this tick. ``moving``: what moves."""
         if self._goal is None or self._state is None or self._recovery.is_backing(view.pose.time_s):

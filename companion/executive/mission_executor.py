@@ -90,6 +90,8 @@ LAP_M = 1.0
 """A shorter lap has led nowhere: the next one begins after a while."""
 MOVED_M = 1.0
 """So much farther than where it counts as arrived, a rover has been moved away from a place."""
+STUCK_TOLD = 6
+"""People are told each time the rover was stuck so often at one place: every minute or so."""
 FAILED = (CommandResult.REFUSED, CommandResult.UNANSWERED)
 
 
@@ -479,8 +481,14 @@ class MissionExecutor:
 
     def guide(self, task: MissionTask, view: LocalView) -> ControlCommand:
         """How to do now what was decided: the setpoint and the speed."""
-        stands = task is MissionTask.STAND
-        return self.driver.standing(view, self.moving) if stands else self.driver.guide(view, self.moving)
+        if task is MissionTask.STAND:
+            return self.driver.standing(view, self.moving)
+        before, command = self.driver.stuck_here, self.driver.guide(view, self.moving)
+        times = self.driver.stuck_here
+        if times != before and times % STUCK_TOLD == 0:
+            text = f"Stuck {times} times at one place, heading for {self.progress.goal.name}: goes on looking for a way"
+            self._notifier.tell(text, Severity.WARNING)
+        return command
 
     def learn(self, view: LocalView) -> None:
         """One more moment that may tell how the rover follows velocities. ``view`` knows what was told lately."""

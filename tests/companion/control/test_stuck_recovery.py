@@ -9,6 +9,7 @@ from companion.control.controller import STANDSTILL, ControlCommand, Purpose, st
 from companion.control.local_view import LocalView
 from companion.control.stuck_recovery import (
     CIRCLES_M,
+    ELSEWHERE_M,
     FRESH_PENALTY,
     LINGERS_PER_M,
     MOVED_M,
@@ -114,6 +115,15 @@ def test_it_backs_out_as_far_as_the_settings_say() -> None:
     assert command.setpoint == GuidedVelocity(-guidance.back_out_speed_m_s, 0.0)
     assert recovery.backing(view(ends_s - 0.01, evidence)) is not None
     assert recovery.backing(view(ends_s, evidence)) is None
+
+
+def test_it_counts_how_often_it_was_stuck_at_one_place() -> None:
+    recovery, evidence = watching(), seen_map()
+    counts = []
+    for north_m in (10.5, 10.9, 10.1, 10.5 + ELSEWHERE_M, 10.6 + ELSEWHERE_M, 10.5):
+        recovery.back_out(view(1.0, evidence, north_m), AHEAD)
+        counts.append(recovery.times_here)
+    assert counts == [1, 2, 3, 1, 2, 1]
 
 
 def test_one_that_still_turns_stands_first_as_it_would_not_go_straight() -> None:

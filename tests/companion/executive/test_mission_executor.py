@@ -11,7 +11,7 @@ import pytest
 
 from companion.core.frames import LocalFrame, NedPoint
 from companion.core.grid import Cell
-from companion.executive.mission_executor import ROLLS_OUT_S, MissionTask
+from companion.executive.mission_executor import ROLLS_OUT_S, STUCK_TOLD, MissionTask
 from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import OnBlocked
@@ -213,3 +213,13 @@ def test_a_target_that_is_tried_again_is_not_called_unreachable(tmp_path: Path) 
     step(desk)
     assert desk.notices.texts[1].startswith("No way now: gate (") and "; tries again in 5 s" in desk.notices.texts[1]
     assert desk.executor.progress.tries_again and desk.executor.blocked_since_s == pytest.approx(desk.now_s)
+
+
+def test_a_rover_that_is_stuck_again_and_again_says_so_every_few_times(desk: Desk) -> None:
+    for _ in range(400):
+        step(desk, 0.5)
+    stuck = [text for text in desk.notices.texts if text.startswith("Stuck")]
+    assert desk.executor.driver.stuck_here >= 2 * STUCK_TOLD
+    said = "at one place, heading for gate: goes on looking for a way"
+    assert stuck[:2] == [f"Stuck {times} times {said}" for times in (STUCK_TOLD, 2 * STUCK_TOLD)]
+    assert len(stuck) == desk.executor.driver.stuck_here // STUCK_TOLD
