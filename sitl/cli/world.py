@@ -146,7 +146,8 @@ def _world(ground: MadeGround) -> bytes:
 def _mission(ground: MadeGround, seed: int, given: Parameters, measures: Difficulty, world: str) -> str:
     """The text of the mission in a world with this file's name."""
     start, goal = ground.start_m, ground.goal_m
-    told = ", ".join(f"{name} {value:g}" for name, value in given.model_dump().items())
+    values = {**given.model_dump(), "movers": len(ground.movers), "target_east_m": goal[1] - start[1]}
+    told = ", ".join(f"{name} {value:g}" for name, value in values.items())
     measured = ", ".join(f"{name} {value:.3g}" for name, value in asdict(measures).items())
     lines = [
         f"# rover-sitl world make {ground.kind} --seed {seed}: {told}",
