@@ -61,8 +61,8 @@ class MappingSettings(Section):
         0.125,
         ge=0.05,
         le=2.0,
-        description="side of an evidence cell; a field's side is a whole number of them. Smaller ones were not tried: "
-        "planned motions are bolder in gaps then",
+        description="wanted side of an evidence cell: a field's side is a whole number of them, so it is less where "
+        "fields are small. Planned motions are bolder in gaps with smaller ones",
     )
     keeps: Literal["circle", "outline"] = Field(
         "circle",
