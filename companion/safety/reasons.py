@@ -88,6 +88,7 @@ class WaitReason(Enum):
     ROOM_TO_BORDER = "the rover to stand {}"
     ON_THE_GRID = "the rover to stand on the mission's grid"
     REQUEST_TO_BEGIN = "a person to ask it to go on (a pause was asked for before the mission began)"
+    GUARD_TELLS = "the guard to tell whether it has put HOLD, or a person to set GUIDED"
     GUIDED = "GUIDED (asked for)"
     ARMING = "arming (asked for; the autopilot says if it refuses)"
     PERSON_STARTS_AUTO = "a person to arm and to set AUTO (the autopilot drives this mission)"

@@ -171,6 +171,8 @@ class Arming:
         hindrance = self._limits.awaited(now_s, left_driving=self._left_driving()) or self._too_near(vehicle, now_s)
         hindrance = Reason(WaitReason.REQUEST_TO_BEGIN) if self._run.start_paused else hindrance
         control = Control.PERSON if self._had_by_person(vehicle) else self._whose(vehicle)
+        if hindrance is None and control is Control.PERSON and self._awaits_guard(vehicle):
+            hindrance = Reason(WaitReason.GUARD_TELLS)
         # A person who disarms the rover does not want it armed again by itself.
         self._arm = self._arm and not (vehicle.heartbeat is not None and vehicle.heartbeat.armed)
         settings, listens = self._settings.current.safety, self._autopilot.trouble
@@ -252,6 +254,12 @@ class Arming:
         if control is not Control.NOBODY or self._previous is None:
             return control
         return Control.PERSON if self._owner is None else self._owner.control
+
+    def _awaits_guard(self, vehicle: VehicleState) -> bool:
+        """Whether an earlier run had the rover, and the guard has not yet told who put it into HOLD."""
+        previous = self._previous
+        known = vehicle.heartbeat is not None and vehicle.position is not None
+        return previous is not None and previous.state.guarded and self._owner is None and known and not self._persons
 
     # The mission on the ground -----------------------------------------------------------------------------------
 

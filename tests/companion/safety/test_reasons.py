@@ -92,6 +92,7 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (WaitReason.ARMING, (), "arming (asked for; the autopilot says if it refuses)"),
     (WaitReason.PERSON_STARTS_AUTO, (), "a person to arm and to set AUTO (the autopilot drives this mission)"),
     (WaitReason.PERSON_SETS_GUIDED, (), "a person to set GUIDED (somebody is driving)"),
+    (WaitReason.GUARD_TELLS, (), "the guard to tell whether it has put HOLD, or a person to set GUIDED"),
     (WaitReason.PERSON_SETS_GUIDED_AGAIN, (), "a person to set GUIDED (the rover was taken over, or stopped in doubt)"),
     (WaitReason.PERSON_ARMS, (), "a person to arm (or run with --arm)"),
     (WaitReason.AUTOPILOT_HEARD, (), "the autopilot to be heard again"),

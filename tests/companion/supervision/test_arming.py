@@ -27,7 +27,7 @@ from companion.supervision.arming import (
     overruled,
 )
 from companion.vehicle.commands import Arm, Command, SetMode
-from companion.vehicle.events import AckSeen, EkfStatusSeen, HeartbeatSeen, RoverMode
+from companion.vehicle.events import AckSeen, EkfStatusSeen, GuardSeen, HeartbeatSeen, RoverMode
 from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState
 from tests.companion.safety.test_mode_latch import EKF_GOOD, GUIDED, HOLD, MANUAL, PLACE, vehicle
@@ -344,6 +344,23 @@ def test_a_run_that_had_stopped_the_rover_goes_on_only_if_all_is_as_it_was(
     persons = WaitReason.PERSON_SETS_GUIDED if driven else WaitReason.PERSON_SETS_GUIDED_AGAIN
     assert start.step(mode, armed=armed) is (WaitReason.GUIDED if same else persons)
     assert start.autopilot.taken() == ([SetMode(GUIDED)] if same else [])
+
+
+@pytest.mark.parametrize(("acted", "then"), [(True, WaitReason.GUIDED), (False, WaitReason.PERSON_SETS_GUIDED_AGAIN)])
+def test_in_hold_the_guard_is_heard_before_a_person_is_waited_for(
+    tmp_path: Path, acted: bool, then: WaitReason
+) -> None:
+    start = Armed(tmp_path, previous=left(guarded=True))
+    assert start.step(HOLD) is WaitReason.GUARD_TELLS and start.autopilot.taken() == []
+    start.run.vehicle = replace(start.run.vehicle, guard=GuardSeen(start.now_s, 0.3, acted))
+    assert start.step(HOLD) is then
+
+
+def test_whoever_sets_another_mode_meanwhile_has_the_rover(tmp_path: Path) -> None:
+    start = Armed(tmp_path, previous=left(guarded=True))
+    assert start.step(HOLD) is WaitReason.GUARD_TELLS
+    assert start.step(MANUAL) is WaitReason.PERSON_SETS_GUIDED
+    assert start.step(HOLD) is WaitReason.PERSON_SETS_GUIDED_AGAIN and start.autopilot.taken() == []
 
 
 def test_a_fence_that_has_closed_meanwhile_does_not_keep_a_run_from_being_taken_up(tmp_path: Path) -> None:
