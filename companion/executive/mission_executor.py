@@ -238,6 +238,7 @@ class MissionExecutor:
             f"The autopilot has moved its origin by {moved_m:.1f} m: mission laid out anew", Severity.WARNING
         )
         self.maps_begun += 1
+        self.range_ages.begin_anew()
         mapping = self._given.mapping
         self.layout, self.progress = lay_again(
             self.layout, self.progress, self._mission, mapping, origin, narrow_sight=self._scan.is_narrow
@@ -257,6 +258,7 @@ class MissionExecutor:
     def forget_map(self, now_s: float) -> None:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
+        self.range_ages.begin_anew()
         self.maps_begun += 1
         self._tracker, self._unmoved_m = ObjectTracker(self.evidence), (0.0, 0.0)
         self.driver.leave()
@@ -268,6 +270,7 @@ class MissionExecutor:
 
         What has a place on earth stays: targets, goals that people ask for, rally points, fences, known ground.
         """
+        self.range_ages.begin_anew()
         evidence, left = self.evidence, self._unmoved_m
         done_n, done_e = move(evidence, left[0] + north_m, left[1] + east_m)
         self._unmoved_m = left[0] + north_m - done_n, left[1] + east_m - done_e

@@ -99,6 +99,11 @@ class RangeAges:
         for sensor, age_s in found:
             self._voices.setdefault(sensor, _Voice()).age_s = age_s
 
+    def begin_anew(self) -> None:
+        """The rover's place has jumped: scans from before lie elsewhere. What was found of ages stays."""
+        for voice in self._voices.values():
+            voice.before.clear()
+
     def hear(self, vehicle: VehicleState) -> None:
         """The vehicle after each event: its last attitude counts."""
         if vehicle.attitude is not None:

@@ -18,7 +18,7 @@ from companion.operator.notifications import Notifier
 from companion.perception.deskew import deskewed
 from companion.perception.range_age import RangeAges
 from companion.perception.scan_filter import NEAREST_OF_ALL, Sensor, newest_ranges, sensor_of
-from companion.safety.watchdogs import ScanMonitor
+from companion.safety.watchdogs import ScanMonitor, data_doubt
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.vehicle.events import Event, RangeSeen, TextSeen
@@ -26,6 +26,9 @@ from companion.vehicle.state import VehicleState, fold
 
 TOLD_ANEW_S = 0.04
 """An age of ranges is told again when it has changed by so much."""
+FRESH_S = 0.3
+"""Position and heading that are older say nothing about the age of ranges: a rover whose autopilot has just fallen
+silent has stopped turning, but its last turn rate stands still."""
 OLD_S = 0.3
 """What moves, and what comes into view late, is seen later than the rover counts on."""
 
@@ -127,13 +130,20 @@ class EventDispatcher:
         if set_s is not None:
             return set_s
         vehicle, scan = self._run.vehicle, event.scan
-        pose = vehicle.pose_at(vehicle.seen_s(event))
-        if pose is not None and vehicle.attitude is not None:
-            ages.note(scan, pose, vehicle.forward_m_s, vehicle.attitude.yaw_rate_rad_s)
+        pose, attitude = vehicle.pose_at(vehicle.seen_s(event)), vehicle.attitude
+        if pose is not None and attitude is not None and self._is_known_now(vehicle, event.time_s):
+            ages.note(scan, pose, vehicle.forward_m_s, attitude.yaw_rate_rad_s)
         age_s = ages.age_s(scan)
         sensor = sensor_of(scan)
         if abs(age_s - self._told_s.get(sensor, 0.0)) >= TOLD_ANEW_S:
             self._told_s[sensor] = age_s
             severity = Severity.WARNING if age_s > OLD_S else Severity.NOTICE
-            self._notifier.tell(f"Ranges ({scan.source}) are {age_s:.2f} s older than positions", severity)
+            how = f"{age_s:.2f} s older than" if age_s > 0.0 else "as old as"
+            self._notifier.tell(f"Ranges ({scan.source}) are {how} positions", severity)
         return age_s
+
+    def _is_known_now(self, vehicle: VehicleState, now_s: float) -> bool:
+        """Whether position and heading are of now, and good."""
+        assert vehicle.position is not None and vehicle.attitude is not None
+        fresh = min(vehicle.position.time_s, vehicle.attitude.time_s) >= now_s - FRESH_S
+        return fresh and data_doubt(vehicle, now_s, self._settings.current.safety) is None

@@ -23,14 +23,16 @@ from companion.vehicle.commands import (
     ParameterValue,
 )
 from companion.vehicle.events import (
+    EkfStatusSeen,
     Event,
     HeartbeatSeen,
     ParameterAsked,
     RangeSeen,
     TextSeen,
 )
+from companion.vehicle.state import VehicleState
 from tests.companion.perception.test_range_age import scan_at, to_and_fro
-from tests.companion.safety.test_mode_latch import HOLD
+from tests.companion.safety.test_mode_latch import EKF_GOOD, HOLD
 from tests.support.desk import Desk
 from tests.support.whole import Whole
 
@@ -132,6 +134,48 @@ def test_ranges_over_the_link_lie_where_the_rover_was_before_as_long_as_they_are
     assert (found.pose.north_m, found.pose.east_m) == pytest.approx(there_m, abs=0.002)
 
 
+def at(seen: VehicleState, time_s: float, heading_rad: float, rate_rad_s: float) -> VehicleState:
+    """The vehicle, heard anew: it stands and turns."""
+    position, attitude, heartbeat, ahead = seen.position, seen.attitude, seen.heartbeat, seen.scan_ahead
+    assert position is not None and attitude is not None and heartbeat is not None and ahead is not None
+    return replace(
+        seen,
+        position=replace(position, time_s=time_s, north_m_s=0.0, east_m_s=0.0),
+        attitude=replace(attitude, time_s=time_s, heading_rad=heading_rad, yaw_rate_rad_s=rate_rad_s),
+        heartbeat=replace(heartbeat, time_s=time_s),
+        scan_ahead=replace(ahead, time_s=time_s),
+        ekf=EkfStatusSeen(time_s, EKF_GOOD),
+    )
+
+
+@pytest.mark.parametrize(
+    ("silent", "old_s", "told"),
+    [
+        ("position", 0.2, 1),
+        ("position", 0.4, 0),
+        ("attitude", 0.0, 1),
+        ("attitude", 0.4, 0),
+        ("ekf", 0.4, 1),
+        ("ekf", 2.0, 0),
+    ],
+)
+def test_ranges_do_not_seem_old_by_positions_and_headings_that_are(
+    tmp_path: Path, silent: str, old_s: float, told: int
+) -> None:
+    """A rover whose autopilot falls silent while it turns: it stops, but in the last attitude it turns on."""
+    heard, texts = Heard(tmp_path), []
+    heard.notifier.tell = lambda text, severity: texts.append(text)
+    seen = heard.desk.stand(0.0, 0.0)
+    for time_s in heard.desk.now_s + np.arange(0.0, 6.0, 0.1):
+        heading_rad, rate_rad_s = to_and_fro(time_s)
+        now = at(seen, time_s, heading_rad, rate_rad_s)
+        heard.desk.run.vehicle = replace(now, **{silent: replace(getattr(now, silent), time_s=time_s - old_s)})
+        scan = replace(scan_at(time_s, heading_rad - 0.2 * rate_rad_s, (0.0, 0.0)), time_s=time_s)
+        heard.desk.autopilot.events = [RangeSeen(time_s, scan)]
+        heard.dispatcher.listen(time_s)
+    assert len(texts) == told
+
+
 @pytest.mark.parametrize("told_s", [None, 0.0])
 def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
     tmp_path: Path, told_s: float | None
@@ -146,11 +190,7 @@ def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
     turned_rad = []
     for time_s in heard.desk.now_s + np.arange(0.0, 6.0, 0.1):
         heading_rad, rate_rad_s = to_and_fro(time_s)
-        heard.desk.run.vehicle = replace(
-            seen,
-            position=replace(seen.position, time_s=time_s, north_m_s=0.0, east_m_s=0.0),
-            attitude=replace(seen.attitude, time_s=time_s, heading_rad=heading_rad, yaw_rate_rad_s=rate_rad_s),
-        )
+        heard.desk.run.vehicle = at(seen, time_s, heading_rad, rate_rad_s)
         scan = replace(scan_at(time_s, to_and_fro(time_s - 0.2)[0], (0.0, 0.0)), time_s=time_s)
         heard.desk.autopilot.events = [RangeSeen(time_s, scan)]
         (found,) = heard.dispatcher.listen(time_s)
