@@ -95,6 +95,10 @@ class GoalDriver:
         self._pending = 0  # the epoch of the step under way: a step begun before a new leg or a recovery is void
         self._planned_among: tuple[Moving, ...] = ()
         self._replanned_s = -math.inf
+        self._among_movers = False
+        """Whether the step under way is planned among things that move."""
+        self._shut_in = False
+        """Whether things that move left no path: the next step is planned without them."""
         self._avoidance = CollisionAvoidance()
         self.makes_way = False
         """Whether something else than the path leads in this tick, because of what moves."""
@@ -257,7 +261,8 @@ class GoalDriver:
         if result is None or self._pending != self._epoch:
             return None
         self.step_s = pose.time_s - self._began_s
-        if self._is_doubted(result[1], view):
+        self._shut_in = self._among_movers and _gives_up(result[1])
+        if self._shut_in or self._is_doubted(result[1], view):
             self._state = abandon_path(self._state)
             self.path = self.decision = None
             return None
@@ -270,7 +275,8 @@ class GoalDriver:
         pose, settings, rover = view.pose, view.settings, view.rover
         grid = with_turning_cost(view.evidence.grid, pose, settings.guidance, rover.turning_radius_m)
         weights, navigator = grid.weights, settings.navigator
-        movers = self._movers(view, moving)
+        movers = () if self._shut_in else self._movers(view, moving)
+        self._among_movers = bool(movers)
         kinematics = kinematics_of(pose, rover, self._fastest_m_s(view), settings, grid)
 
         def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
@@ -313,7 +319,7 @@ class GoalDriver:
 
         The proof that there is no path is only as good as the map and the position.
         """
-        giving_up = decision.action is Action.UNREACHABLE or (decision.part is Part.RETURN and decision.proved)
+        giving_up = _gives_up(decision)
         if not giving_up or view.pose.time_s < self._sure_from_s:
             return giving_up
         if self._doubts_left == 0 or not forget_weak_evidence(view.evidence, view.pose.point, DOUBT_REACH_M):
@@ -369,3 +375,8 @@ class GoalDriver:
         if room_m < narrow_m:
             return place
         return pose.point.moved(pose.point.bearing_rad(self.path.point_ahead(side_m)), side_m)
+
+
+def _gives_up(decision: Decision) -> bool:
+    """Whether the target is given up, or the rover goes back, because there is no path."""
+    return decision.action is Action.UNREACHABLE or (decision.part is Part.RETURN and decision.proved)

@@ -18,10 +18,12 @@ from companion.executive.goal_driver import GoalDriver
 from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
-from companion.navigation.field_step import Decision, NavState
+from companion.navigation.field_step import Action, Decision, NavState
 from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import InlineRunner, StepCall, StepRunner, ThreadRunner
 from companion.perception.moving_obstacles import Moving
+from companion.planning.planner import Capabilities
+from companion.planning.problem import Budget, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.registry import make_planner
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
@@ -226,3 +228,30 @@ def test_it_makes_way_on_for_what_it_turned_off_for_when_that_is_out_of_view() -
     assert one.driver.makes_way
     assert one.driver.guide(one.at(6.0, 1.5)).purpose is Purpose.DRIVE
     assert not one.driver.makes_way
+
+
+class ShutIn:
+    """Plans among what moves, and finds nothing as long as there is anything; else as A*."""
+
+    name = "shut in"
+    capabilities = Capabilities(proves_no_path=True, moving_obstacles=True)
+
+    def __init__(self, *, walled: bool) -> None:
+        self._alone, self._walled = make_planner("astar", SETTINGS.planner), walled
+
+    def plan(self, problem: PlanningProblem, budget: Budget, rng: np.random.Generator) -> PlanResult:
+        if self._walled or problem.moving_obstacles:
+            return PlanResult(PlanStatus.NO_PATH, None, self.name)
+        return self._alone.plan(problem, budget, rng)
+
+
+@pytest.mark.parametrize("walled", [False, True])
+def test_what_moves_makes_no_target_unreachable(walled: bool) -> None:
+    one, walker = Drive(InlineRunner()), Moving("m", 0.0, NedPoint(23.0, 20.5), 0.0, 0.3, 0.5)
+    searcher = PathSearcher(ShutIn(walled=walled), np.random.default_rng(1))
+    one.driver = GoalDriver(PointController(), searcher, InlineRunner())
+    one.head_for(target(30.5, 20.5))
+    found = [one.driver.decide(one.at(0.05 * tick), (walker,)) for tick in range(20)]
+    actions = [one.action for one in found if one is not None]
+    assert actions[0] is (Action.UNREACHABLE if walled else Action.FOLLOW)
+    assert found[0] is None, "the first search is among what moves, and proves nothing"
