@@ -72,6 +72,7 @@ results: $(TOOLS)
 	$(BIN)/rover-sitl experiment missions --runs 25 --controllers motion-ga --guard --docs docs
 	$(BIN)/rover-sitl experiment missions --runs 8 --controllers motion-ga --docs docs
 	$(BIN)/rover-sitl experiment controllers --runs 34 --controllers points,motion-ga,dwa,mppi --docs docs
+	$(BIN)/rover-sitl experiment controllers --runs 34 --controllers motion-ga,mppi,dwa --off 0.5 --docs docs
 	$(BIN)/rover-sitl experiment gates --runs 50 --controllers motion-ga --setups guarded --docs docs
 	$(BIN)/rover-sitl experiment gates --runs 4 --setups strict --docs docs
 	$(BIN)/rover-sitl experiment dead-companion --runs 6 --docs docs

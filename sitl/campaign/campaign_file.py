@@ -194,6 +194,10 @@ def _check_search(path: Path, search: SearchTable) -> None:
         raise CampaignError(f"{path}: search.parts: one stands there twice; name each once")
     if search.settings and SearchPart.SETTINGS not in search.parts:
         raise CampaignError(f'{path}: search.settings: moved only where "settings" stands in search.parts')
+    if "faults_until_s" in search.model_fields_set and SearchPart.FAULTS not in search.parts:
+        raise CampaignError(
+            f'{path}: search.faults_until_s: means something only where "faults" stands in search.parts'
+        )
     for name, (low, high) in search.settings.items():
         section, _, key = name.partition(".")
         usual = getattr(getattr(Settings(), section, None), key or "-", None)

@@ -69,6 +69,10 @@ def test_each_combination_is_one_run_for_each_seed_and_seeds_come_one_after_the_
             'search.settings: moved only where "settings" stands in search.parts',
         ),
         (
+            'worlds = ["yard"]\n[search]\nparts = ["rover"]\nfaults_until_s = 20.0',
+            'search.faults_until_s: means something only where "faults" stands in search.parts',
+        ),
+        (
             'worlds = ["yard"]\n[search]\nsettings = { "navigator.doubts" = [1, inf] }',
             "search.settings: navigator.doubts: must be a",
         ),
