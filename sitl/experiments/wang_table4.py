@@ -368,7 +368,8 @@ The paper says that on-line planning generally needs fewer generations and less 
 of the way has fewer vertices ("off-line gen." and "off-line first" are those of the first feasible path). Here the
 median is less on-line for {_quicker(entries)}.
 
-What choosing speeds pays, what a mixed cost gives, and what the straight line in the first population (ours) changes:
+What choosing speeds pays, what a mixed cost gives (*time and length*: weight 1 on seconds and 1 on metres), and what
+the straight line in the first population (ours) changes:
 variants of least time, with the same seeds. "More s" is the off-line time against the first variant, over pairs of one
 seed, with its 95 % interval; less than 0: quicker than with five speeds to choose from. "Gen." cannot be compared with
 the paper's while the straight line is there.

@@ -127,6 +127,14 @@ def test_the_fastest_way_is_driven_at_the_highest_speed():
     assert len(path.speeds_fields_s) == len(path.curve) - 1
 
 
+def test_one_speed_alone_is_the_highest():
+    problem, one = crowded(3), SETTINGS.model_copy(update={"speed_levels": 1})
+    for seed in range(5):
+        path = plan(problem, seed, settings=one).path
+        assert path is not None
+        assert path.speeds_fields_s == pytest.approx(problem.kinematics.speeds_fields_s[1])
+
+
 def test_it_slows_down_for_an_obstacle_that_crosses():
     """In a corridor without room to go round, the only way to let something pass is to be slower."""
     weights = np.full((21, 60), 1.0)
