@@ -16,7 +16,6 @@ from companion.lidar.reader import Lidars
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.operator.notifications import Notifier
 from companion.perception.deskew import deskewed
-from companion.perception.range_age import RangeAges
 from companion.perception.scan_filter import NEAREST_OF_ALL, Sensor, newest_ranges, sensor_of
 from companion.safety.watchdogs import ScanMonitor, data_doubt
 from companion.settings.live_settings import LiveSettings
@@ -119,27 +118,34 @@ class EventDispatcher:
         if pose is None or attitude is None:
             return None
         ages = executor.range_ages
-        if scan.sender != WIRED and scan.age_s is None and (age_s := self._age_s(event, ages)) > 0.0:
+        if scan.sender != WIRED and scan.age_s is None and (age_s := self._age_s(event, executor, now_s)) > 0.0:
             pose = ages.before(pose, age_s, vehicle.forward_m_s)
         rate_rad_s = attitude.yaw_rate_rad_s
         return LocatedScan(pose, rate_rad_s, deskewed(scan, vehicle.forward_m_s, rate_rad_s))
 
-    def _age_s(self, event: RangeSeen, ages: RangeAges) -> float:
-        """How old the ranges are, over MAVLink; told of each sensor when it is found, and when it changes."""
+    def _age_s(self, event: RangeSeen, executor: MissionExecutor, now_s: float) -> float:
+        """How old the ranges are, over MAVLink; told of each sensor when it is found, and when it changes.
+
+        What was mapped before it was found lies aside, and some of it would not be seen again soon: the map begins
+        anew.
+        """
         set_s = self._settings.current.mapping.range_age_s
         if set_s is not None:
             return set_s
-        vehicle, scan = self._run.vehicle, event.scan
+        vehicle, scan, ages = self._run.vehicle, event.scan, executor.range_ages
         pose, attitude = vehicle.pose_at(vehicle.seen_s(event)), vehicle.attitude
         if pose is not None and attitude is not None and self._is_known_now(vehicle, event.time_s):
             ages.note(scan, pose, vehicle.forward_m_s, attitude.yaw_rate_rad_s)
         age_s = ages.age_s(scan)
         sensor = sensor_of(scan)
-        if abs(age_s - self._told_s.get(sensor, 0.0)) >= TOLD_ANEW_S:
+        goes_on, before_s = sensor not in self._told_s, self._told_s.setdefault(sensor, 0.0)
+        if abs(age_s - before_s) >= TOLD_ANEW_S:
             self._told_s[sensor] = age_s
             severity = Severity.WARNING if age_s > OLD_S else Severity.NOTICE
             how = f"{age_s:.2f} s older than" if age_s > 0.0 else "as old as"
             self._notifier.tell(f"Ranges ({scan.source}) are {how} positions", severity)
+            if before_s == 0.0 and not goes_on:  # an earlier run had laid its map with it
+                executor.begin_map(now_s)
         return age_s
 
     def _is_known_now(self, vehicle: VehicleState, now_s: float) -> bool:

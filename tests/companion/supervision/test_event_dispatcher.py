@@ -15,6 +15,7 @@ from companion.core.scan import WIRED
 from companion.core.severity import Severity
 from companion.executive.mission_run import LocatedScan
 from companion.operator.notifications import News
+from companion.perception.scan_filter import sensor_of
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
 from companion.supervision.event_dispatcher import EventDispatcher
@@ -203,3 +204,18 @@ def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
     assert turned_rad[0] == 0.0 and turned_rad[-1] == pytest.approx(0.0 if told_s == 0.0 else 0.2, abs=0.03)
     assert len(told) == (0 if told_s == 0.0 else 1)
     assert told_s == 0.0 or told[0].startswith("Ranges (OBSTACLE_DISTANCE) are 0.")
+    begun = heard.desk.executor.maps_begun
+    assert begun == (0 if told_s == 0.0 else 1), "what had been mapped before lies aside"
+
+
+def test_a_run_that_goes_on_with_an_age_keeps_the_map_that_was_laid_with_it(tmp_path: Path) -> None:
+    heard, told = Heard(tmp_path), []
+    heard.notifier.tell = lambda text, severity: told.append(text)
+    seen = heard.desk.stand(0.0, 0.0)
+    scan = scan_at(heard.desk.now_s, 0.0, (0.0, 0.0))
+    heard.desk.executor.range_ages.go_on([(sensor_of(scan), 0.2)])
+    heard.desk.run.vehicle = at(seen, heard.desk.now_s, 0.0, 0.0)
+    heard.desk.autopilot.events = [RangeSeen(heard.desk.now_s, replace(scan, time_s=heard.desk.now_s))]
+    heard.dispatcher.listen(heard.desk.now_s)
+    assert told == ["Ranges (OBSTACLE_DISTANCE) are 0.20 s older than positions"]
+    assert heard.desk.executor.maps_begun == 0
