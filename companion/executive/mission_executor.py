@@ -136,7 +136,7 @@ class MissionExecutor:
         self._runner = runner
         self._log = log
         self._notifier = notifier
-        self._scans, self._stands_first = 0, False
+        self._scans = 0
         self.trail = Trail()
         """The way back to where the mission began."""
         self._refuges: list[Refuge] = []
@@ -264,11 +264,6 @@ class MissionExecutor:
         self.driver.leave()
         self.driver.forget_places()
         self.driver.give_up_no_target_before(now_s + VERDICT_S)
-
-    def begin_map(self, now_s: float) -> None:
-        """What has been seen was laid aside of where it is: the rover stands, and goes on by what it sees then."""
-        self.forget_map(now_s)
-        self._stands_first = True
 
     def move_map(self, north_m: float, east_m: float, now_s: float) -> None:
         """The position has stepped, the rover has not: what was seen and driven keeps its place beside the rover.
@@ -556,20 +551,17 @@ class MissionExecutor:
         return True
 
     def _rolls_on(self, view: LocalView) -> bool:
-        """Whether the rover rolls that is to stand first: its map begins anew, or its way back begins where it stands.
+        """Whether the rover leaves the place where its way back begins: that is laid from where it comes to stand.
 
         No longer than ``ROLLS_OUT_S``: a speed that never becomes zero must not keep it here.
         """
         refuge = self._refuges[0] if self._refuges else None
-        goes_back = refuge is not None and bool(refuge.way) and self.progress.goal == refuge.place
-        if not goes_back and not self._stands_first:
+        if refuge is None or not refuge.way or self.progress.goal != refuge.place:
             return False
         if self._rolls_until_s is None:
             self._rolls_until_s = view.pose.time_s + ROLLS_OUT_S
         rolls = view.speed_m_s > max(view.settings.guidance.roll_out_m_s, ROLLS_M_S)
-        rolls = rolls and view.pose.time_s < self._rolls_until_s
-        self._stands_first = self._stands_first and rolls
-        return rolls
+        return rolls and view.pose.time_s < self._rolls_until_s
 
     def _way_back(self, pose: Pose) -> tuple[Cell, ...]:
         """The fields to follow to a refuge, where they are known and the rover has not left that way."""

@@ -126,8 +126,8 @@ class EventDispatcher:
     def _age_s(self, event: RangeSeen, executor: MissionExecutor, now_s: float) -> float:
         """How old the ranges are, over MAVLink; told of each sensor when it is found, and when it changes.
 
-        What was mapped before it was found lies aside, and some of it would not be seen again soon: the map begins
-        anew.
+        What was mapped before it was found lies aside, so the map is forgotten. The rover does not stand for that: it
+        was about to turn past something, perhaps, and one scan shows what is in view.
         """
         set_s = self._settings.current.mapping.range_age_s
         if set_s is not None:
@@ -145,7 +145,7 @@ class EventDispatcher:
             how = f"{age_s:.2f} s older than" if age_s > 0.0 else "as old as"
             self._notifier.tell(f"Ranges ({scan.source}) are {how} positions", severity)
             if before_s == 0.0 and not goes_on:  # an earlier run had laid its map with it
-                executor.begin_map(now_s)
+                executor.forget_map(now_s)
         return age_s
 
     def _is_known_now(self, vehicle: VehicleState, now_s: float) -> bool:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from companion.control.controller import STANDSTILL
 from companion.core.frames import LocalFrame, NedPoint
 from companion.core.grid import Cell
 from companion.executive.mission_executor import ROLLS_OUT_S, STUCK_TOLD, MissionTask
@@ -114,20 +113,6 @@ def test_the_way_back_is_laid_from_where_the_rover_comes_to_stand(desk: Desk) ->
     desk.clock.time_s += ROLLS_OUT_S
     rolls(desk, 0.2)
     assert desk.executor.decide(desk.run.vehicle, desk.now_s) is MissionTask.DRIVE, "a speed that is never zero"
-
-
-def test_a_rover_whose_map_begins_anew_stands_before_it_goes_on(desk: Desk) -> None:
-    step(desk)
-    rolls(desk, 1.0)
-    assert desk.executor.decide(desk.run.vehicle, desk.now_s) is MissionTask.DRIVE
-    desk.executor.begin_map(desk.now_s)
-    assert desk.executor.maps_begun == 1
-    assert desk.executor.decide(desk.run.vehicle, desk.now_s) is MissionTask.STAND
-    assert desk.executor.guide(MissionTask.STAND, desk.executor.view(desk.run.vehicle, desk.now_s)) == STANDSTILL
-    rolls(desk, 0.05)
-    assert desk.executor.decide(desk.run.vehicle, desk.now_s) is MissionTask.DRIVE
-    rolls(desk, 1.0)
-    assert desk.executor.decide(desk.run.vehicle, desk.now_s) is MissionTask.DRIVE, "once is enough"
 
 
 def test_a_rover_that_goes_elsewhere_rolls_on(desk: Desk) -> None:

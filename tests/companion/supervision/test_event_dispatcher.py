@@ -179,13 +179,15 @@ def test_ranges_do_not_seem_old_by_positions_and_headings_that_are(
 
 @pytest.mark.parametrize("told_s", [None, 0.0])
 def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
-    tmp_path: Path, told_s: float | None
+    tmp_path: Path, told_s: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     heard = Heard(
         tmp_path, settings=parse_settings({"mapping": {"range_age_s": told_s}} if told_s == 0.0 else {}, "here")
     )
     told: list[str] = []
+    forgotten: list[float] = []
     heard.notifier.tell = lambda text, severity: told.append(text)
+    monkeypatch.setattr(heard.desk.executor, "forget_map", forgotten.append)
     seen = heard.desk.stand(0.0, 0.0)
     assert seen.position is not None and seen.attitude is not None
     turned_rad = []
@@ -204,13 +206,15 @@ def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
     assert turned_rad[0] == 0.0 and turned_rad[-1] == pytest.approx(0.0 if told_s == 0.0 else 0.2, abs=0.03)
     assert len(told) == (0 if told_s == 0.0 else 1)
     assert told_s == 0.0 or told[0].startswith("Ranges (OBSTACLE_DISTANCE) are 0.")
-    begun = heard.desk.executor.maps_begun
-    assert begun == (0 if told_s == 0.0 else 1), "what had been mapped before lies aside"
+    assert len(forgotten) == (0 if told_s == 0.0 else 1), "what had been mapped before lies aside"
 
 
-def test_a_run_that_goes_on_with_an_age_keeps_the_map_that_was_laid_with_it(tmp_path: Path) -> None:
+def test_a_run_that_goes_on_with_an_age_keeps_the_map_that_was_laid_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     heard, told = Heard(tmp_path), []
     heard.notifier.tell = lambda text, severity: told.append(text)
+    monkeypatch.setattr(heard.desk.executor, "forget_map", lambda now_s: told.append("the map is forgotten"))
     seen = heard.desk.stand(0.0, 0.0)
     scan = scan_at(heard.desk.now_s, 0.0, (0.0, 0.0))
     heard.desk.executor.range_ages.go_on([(sensor_of(scan), 0.2)])
@@ -218,4 +222,3 @@ def test_a_run_that_goes_on_with_an_age_keeps_the_map_that_was_laid_with_it(tmp_
     heard.desk.autopilot.events = [RangeSeen(heard.desk.now_s, replace(scan, time_s=heard.desk.now_s))]
     heard.dispatcher.listen(heard.desk.now_s)
     assert told == ["Ranges (OBSTACLE_DISTANCE) are 0.20 s older than positions"]
-    assert heard.desk.executor.maps_begun == 0
