@@ -5,6 +5,7 @@ Nouns: event dispatcher.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 from typing import Protocol
 
@@ -23,6 +24,8 @@ from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.vehicle.events import Event, RangeSeen, TextSeen
 from companion.vehicle.state import VehicleState, fold
 
+KEPT = 5
+"""So many of the newest scans make the map anew once their age is known."""
 TOLD_ANEW_S = 0.04
 """An age of ranges is told again when it has changed by so much."""
 FRESH_S = 0.3
@@ -80,6 +83,7 @@ class EventDispatcher:
         self._localization = localization
         self._settings = settings
         self._told_s: dict[Sensor, float] = {}
+        self._newest: deque[LocatedScan] = deque(maxlen=KEPT)
 
     def listen(self, now_s: float) -> list[LocatedScan]:
         """Dispatch everything that has come in since the last tick; return the scans that may go on the map."""
@@ -93,8 +97,7 @@ class EventDispatcher:
             for handler in self._handlers:
                 handler.take(event, run.vehicle)
             if run.executor is not None and isinstance(event, RangeSeen):
-                located = self._located(event, now_s, run.executor)
-                found += [] if located is None else [located]
+                found += self._located(event, now_s, run.executor)
         return found
 
     def _note_text(self, event: Event) -> None:
@@ -102,32 +105,39 @@ class EventDispatcher:
         if isinstance(event, TextSeen) and event.severity <= Severity.WARNING:
             self._notifier.note(f"autopilot: {event.text}", Severity(event.severity))
 
-    def _located(self, event: RangeSeen, now_s: float, executor: MissionExecutor) -> LocatedScan | None:
-        """The scan where it was taken; None when that is doubtful.
+    def _located(self, event: RangeSeen, now_s: float, executor: MissionExecutor) -> list[LocatedScan]:
+        """The scan where it was taken; none when that is doubtful. Where its age has just been found those before it,
+        too: the map was forgotten, and one scan alone leaves gaps.
 
         One whose readings have ages is brought to the rover's place of now. One over MAVLink has the age of the
         settings, or that which was found, and lies where the rover was then.
         """
         if not self._scans.fits or self._localization.position_doubted:
-            return None
+            return []
         vehicle = self._run.vehicle
         if event.scan.age_s is not None:
             event = RangeSeen(now_s, replace(event.scan, age_s=event.scan.age_s + (now_s - event.time_s)))
         scan, attitude = event.scan, vehicle.attitude
         pose = vehicle.pose_at(vehicle.seen_s(event))
         if pose is None or attitude is None:
-            return None
-        ages = executor.range_ages
-        if scan.sender != WIRED and scan.age_s is None and (age_s := self._age_s(event, executor, now_s)) > 0.0:
-            pose = ages.before(pose, age_s, vehicle.forward_m_s)
-        rate_rad_s = attitude.yaw_rate_rad_s
-        return LocatedScan(pose, rate_rad_s, deskewed(scan, vehicle.forward_m_s, rate_rad_s))
+            return []
+        forward_m_s, rate_rad_s = vehicle.forward_m_s, attitude.yaw_rate_rad_s
+        now = LocatedScan(pose, rate_rad_s, deskewed(scan, forward_m_s, rate_rad_s))
+        if scan.sender == WIRED or scan.age_s is not None:
+            return [now]
+        maps, age_s = executor.maps_begun, self._age_s(event, executor, now_s)
+        before = self._newest if executor.maps_begun != maps else ()
+        again = [*(one for one in before if sensor_of(one.scan) == sensor_of(scan)), now]
+        self._newest.append(now)
+        if age_s == 0.0:
+            return again
+        return [replace(one, pose=executor.range_ages.before(one.pose, age_s, forward_m_s)) for one in again]
 
     def _age_s(self, event: RangeSeen, executor: MissionExecutor, now_s: float) -> float:
         """How old the ranges are, over MAVLink; told of each sensor when it is found, and when it changes.
 
         What was mapped before it was found lies aside, so the map is forgotten. The rover does not stand for that: it
-        was about to turn past something, perhaps, and one scan shows what is in view.
+        was about to turn past something, perhaps.
         """
         set_s = self._settings.current.mapping.range_age_s
         if set_s is not None:

@@ -18,7 +18,7 @@ from companion.operator.notifications import News
 from companion.perception.scan_filter import sensor_of
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
-from companion.supervision.event_dispatcher import EventDispatcher
+from companion.supervision.event_dispatcher import KEPT, EventDispatcher
 from companion.vehicle.commands import (
     AnswerRequest,
     ParameterValue,
@@ -207,6 +207,23 @@ def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
     assert len(told) == (0 if told_s == 0.0 else 1)
     assert told_s == 0.0 or told[0].startswith("Ranges (OBSTACLE_DISTANCE) are 0.")
     assert len(forgotten) == (0 if told_s == 0.0 else 1), "what had been mapped before lies aside"
+
+
+def test_once_an_age_is_found_the_map_begins_anew_with_the_newest_scans_where_they_were_taken(tmp_path: Path) -> None:
+    heard = Heard(tmp_path)
+    heard.notifier.tell = lambda text, severity: None
+    seen = heard.desk.stand(0.0, 0.0)
+    mapped = []
+    for time_s in heard.desk.now_s + np.arange(0.0, 6.0, 0.1):
+        heard.desk.run.vehicle = at(seen, time_s, *to_and_fro(time_s))
+        scan = replace(scan_at(time_s, to_and_fro(time_s - 0.2)[0], (0.0, 0.0)), time_s=time_s)
+        heard.desk.autopilot.events = [RangeSeen(time_s, scan)]
+        mapped.append(heard.dispatcher.listen(time_s))
+    assert heard.desk.executor.maps_begun == 1
+    (again,) = (one for one in mapped if len(one) != 1)
+    assert len(again) == 1 + KEPT
+    for one in again:
+        assert one.pose.heading_rad == pytest.approx(to_and_fro(one.scan.time_s - 0.2)[0], abs=0.1)
 
 
 def test_a_run_that_goes_on_with_an_age_keeps_the_map_that_was_laid_with_it(
