@@ -9,7 +9,7 @@ from collections import deque
 from dataclasses import replace
 from typing import Protocol
 
-from companion.core.scan import WIRED
+from companion.core.scan import WIRED, RangeScan
 from companion.core.severity import Severity
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_run import LocatedScan, MissionRun
@@ -17,6 +17,7 @@ from companion.lidar.reader import Lidars
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.operator.notifications import Notifier
 from companion.perception.deskew import deskewed
+from companion.perception.range_age import RangeAges
 from companion.perception.scan_filter import NEAREST_OF_ALL, Sensor, newest_ranges, sensor_of
 from companion.safety.watchdogs import ScanMonitor, data_doubt
 from companion.settings.live_settings import LiveSettings
@@ -106,11 +107,12 @@ class EventDispatcher:
             self._notifier.note(f"autopilot: {event.text}", Severity(event.severity))
 
     def _located(self, event: RangeSeen, now_s: float, executor: MissionExecutor) -> list[LocatedScan]:
-        """The scan where it was taken; none when that is doubtful. Where its age has just been found those before it,
-        too: the map was forgotten, and one scan alone leaves gaps.
+        """The scan where it was taken; none when that is doubtful.
 
         One whose readings have ages is brought to the rover's place of now. One over MAVLink has the age of the
-        settings, or that which was found, and lies where the rover was then.
+        settings, or that which was found, and lies where the rover was then. What was mapped before it was found lies
+        aside: so the map is forgotten, and begins anew with the newest scans, as one alone leaves gaps. The rover does
+        not stand for that: it was about to turn past something, perhaps.
         """
         if not self._scans.fits or self._localization.position_doubted:
             return []
@@ -125,38 +127,37 @@ class EventDispatcher:
         now = LocatedScan(pose, rate_rad_s, deskewed(scan, forward_m_s, rate_rad_s))
         if scan.sender == WIRED or scan.age_s is not None:
             return [now]
-        maps, age_s = executor.maps_begun, self._age_s(event, executor, now_s)
-        before = self._newest if executor.maps_begun != maps else ()
-        again = [*(one for one in before if sensor_of(one.scan) == sensor_of(scan)), now]
+        ages, located = executor.range_ages, [now]
+        age_s, just_found = self._age_s(scan, now, ages)
+        if just_found:
+            executor.forget_map(now_s)
+            located = [*(one for one in self._newest if sensor_of(one.scan) == sensor_of(scan)), now]
         self._newest.append(now)
         if age_s == 0.0:
-            return again
-        return [replace(one, pose=executor.range_ages.before(one.pose, age_s, forward_m_s)) for one in again]
+            return located
+        return [replace(one, pose=ages.before(one.pose, age_s, forward_m_s)) for one in located]
 
-    def _age_s(self, event: RangeSeen, executor: MissionExecutor, now_s: float) -> float:
-        """How old the ranges are, over MAVLink; told of each sensor when it is found, and when it changes.
+    def _age_s(self, scan: RangeScan, came: LocatedScan, ages: RangeAges) -> tuple[float, bool]:
+        """How old the ranges are, over MAVLink, and whether that has just been found; told, also when it changes.
 
-        What was mapped before it was found lies aside, so the map is forgotten. The rover does not stand for that: it
-        was about to turn past something, perhaps.
+        ``came``: where the rover was when it came.
         """
         set_s = self._settings.current.mapping.range_age_s
         if set_s is not None:
-            return set_s
-        vehicle, scan, ages = self._run.vehicle, event.scan, executor.range_ages
-        pose, attitude = vehicle.pose_at(vehicle.seen_s(event)), vehicle.attitude
-        if pose is not None and attitude is not None and self._is_known_now(vehicle, event.time_s):
-            ages.note(scan, pose, vehicle.forward_m_s, attitude.yaw_rate_rad_s)
+            return set_s, False
+        vehicle = self._run.vehicle
+        if self._is_known_now(vehicle, scan.time_s):
+            ages.note(scan, came.pose, vehicle.forward_m_s, came.yaw_rate_rad_s)
         age_s = ages.age_s(scan)
         sensor = sensor_of(scan)
         goes_on, before_s = sensor not in self._told_s, self._told_s.setdefault(sensor, 0.0)
-        if abs(age_s - before_s) >= TOLD_ANEW_S:
+        changes = abs(age_s - before_s) >= TOLD_ANEW_S
+        if changes:
             self._told_s[sensor] = age_s
             severity = Severity.WARNING if age_s > OLD_S else Severity.NOTICE
             how = f"{age_s:.2f} s older than" if age_s > 0.0 else "as old as"
             self._notifier.tell(f"Ranges ({scan.source}) are {how} positions", severity)
-            if before_s == 0.0 and not goes_on:  # an earlier run had laid its map with it
-                executor.forget_map(now_s)
-        return age_s
+        return age_s, changes and before_s == 0.0 and not goes_on  # an earlier run had laid its map with it
 
     def _is_known_now(self, vehicle: VehicleState, now_s: float) -> bool:
         """Whether position and heading are of now, and good."""

@@ -196,7 +196,7 @@ def test_the_age_of_ranges_is_found_and_told_once_unless_the_settings_say_it(
         heard.desk.run.vehicle = at(seen, time_s, heading_rad, rate_rad_s)
         scan = replace(scan_at(time_s, to_and_fro(time_s - 0.2)[0], (0.0, 0.0)), time_s=time_s)
         heard.desk.autopilot.events = [RangeSeen(time_s, scan)]
-        (found,) = heard.dispatcher.listen(time_s)
+        found = heard.dispatcher.listen(time_s)[-1]
         # Beside it one of the same sender and message that looks backwards, and whose ranges are not old.
         behind = replace(scan_at(time_s, heading_rad, (0.0, 0.0)), time_s=time_s)
         behind = replace(behind, bearing_rad=np.roll(behind.bearing_rad, 36), range_m=np.roll(behind.range_m, 36))
