@@ -26,7 +26,9 @@ class Doubt(Enum):
     POSITION_FROZEN = "position stands still while the velocity says otherwise"
     POSITION_WANDERS = "position wanders"
     POSITION_WANDERED = "position wandered"
+    POSITION_SETTLES = "position has wandered and does not follow its velocity yet"
     POSITION_JUMPED = "position jumped"
+    MAP_EMPTY = "the map has begun anew, and nothing is on it yet"
     ORIGIN_MOVED = "the autopilot's EKF origin moved"
     FIX_CHANGED = "position steps with the GPS fix"
     GPS_POOR = "GPS fix {}, {} needed"
@@ -45,7 +47,16 @@ class Doubt(Enum):
     """Of a rover that an earlier run left armed in GUIDED."""
 
 
-WAITED_OUT = frozenset((Doubt.FIX_CHANGED, Doubt.GPS_POOR, Doubt.GPS_SILENT, Doubt.GPS_SETTLES))
+WAITED_OUT = frozenset(
+    (
+        Doubt.POSITION_SETTLES,
+        Doubt.MAP_EMPTY,
+        Doubt.FIX_CHANGED,
+        Doubt.GPS_POOR,
+        Doubt.GPS_SILENT,
+        Doubt.GPS_SETTLES,
+    )
+)
 """The rover stands as long as these last, and HOLD does not follow: it goes on by itself."""
 
 

@@ -31,6 +31,9 @@ ASK_PLACES_S = 0.5
 """While the position is doubted, the origin is requested this often."""
 SETTLED_S = 0.4
 """An answer counts if it comes at least this long after the doubt arose: position and origin then share one frame."""
+UNSETTLED_S = 10.0
+"""So long at most the rover stands until the position follows its velocity again. An EKF that followed a wrong GPS
+comes back as slowly, and what is mapped meanwhile lies aside."""
 
 WANDERINGS, WANDERINGS_S = 3, 20.0
 """If the position wanders this often within this time, the rover must not drive."""
@@ -59,6 +62,8 @@ class LocalizationMonitor(Monitor):
         self._wandered_s: deque[float] = deque(maxlen=WANDERINGS)
         self._stepped_s: deque[float] = deque(maxlen=WANDERINGS)
         self._unsure_until_s = self._steps_until_s = -math.inf
+        self._forgot_s: float | None = None
+        """When the map was forgotten; None once something ahead is on it again."""
         self._fix = FixJump()
 
     @property
@@ -72,6 +77,8 @@ class LocalizationMonitor(Monitor):
             return Reason(Doubt.POSITION_WANDERS)
         if self._doubt is None and now_s < self._steps_until_s:
             return Reason(Doubt.FIX_CHANGED)
+        if self._doubt is None and self._forgot_s is not None:
+            return Reason(Doubt.MAP_EMPTY)
         return None if self._doubt is None else Reason(self._doubt)
 
     def tick(self, now_s: float) -> None:
@@ -92,6 +99,8 @@ class LocalizationMonitor(Monitor):
             self._fix.take_report(event)
         if (executor := self._run.executor) is None:
             return
+        if self._forgot_s is not None and vehicle.scan_ahead is not None and vehicle.scan_ahead.time_s > self._forgot_s:
+            self._forgot_s = None
         match event:
             case LocalPositionSeen() if vehicle.jump_m > self._settings.current.safety.jump_m:
                 self._begin(Doubt.POSITION_JUMPED, event.time_s, f"Position jumped {vehicle.jump_m:.1f} m")
@@ -103,7 +112,7 @@ class LocalizationMonitor(Monitor):
                 self._begin(Doubt.POSITION_WANDERED, event.time_s, f"Position wandered {vehicle.wander.off_m:.1f} m")
                 self._count_wandering(event.time_s)
             case OriginSeen():
-                self._find_ground(event, executor)
+                self._find_ground(event, executor, settled=vehicle.wander.settled)
             case HomeSeen() if not self._home_told and apart_m(event.point, executor.layout.home) > HOME_MOVED_M:
                 self._home_told = True
                 self._notifier.tell("Home has moved; the mission stays where it began", Severity.WARNING)
@@ -144,12 +153,20 @@ class LocalizationMonitor(Monitor):
         if len(self._wandered_s) == WANDERINGS and now_s - self._wandered_s[0] <= WANDERINGS_S:
             self._unsure_until_s = now_s + CALM_S
 
-    def _find_ground(self, event: OriginSeen, executor: MissionExecutor) -> None:
+    @property
+    def _wandered(self) -> bool:
+        return self._doubt in (Doubt.POSITION_WANDERED, Doubt.POSITION_SETTLES)
+
+    def _find_ground(self, event: OriginSeen, executor: MissionExecutor, *, settled: bool) -> None:
         """The origin as it is now: after a jump it tells whether the frame has moved, or only the rover in it."""
         if executor.follow_origin(event.point, event.time_s):
             self._doubt, self._doubt_s = Doubt.ORIGIN_MOVED, event.time_s
-        elif self._doubt not in (None, Doubt.FIX_CHANGED) and event.time_s - self._doubt_s >= SETTLED_S:
+        elif self._doubt in (None, Doubt.FIX_CHANGED) or event.time_s - self._doubt_s < SETTLED_S:
+            return
+        elif self._wandered and not settled and event.time_s - self._doubt_s < UNSETTLED_S:
+            self._doubt = Doubt.POSITION_SETTLES
+        else:
             self._fix.begin_anew()
             executor.forget_map(event.time_s)
-            self._doubt = None
+            self._doubt, self._forgot_s = None, event.time_s
             self._run.start_afresh()

@@ -37,6 +37,8 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (Doubt.POSITION_WANDERED, (), "position wandered"),
     (Doubt.POSITION_JUMPED, (), "position jumped"),
     (Doubt.ORIGIN_MOVED, (), "the autopilot's EKF origin moved"),
+    (Doubt.POSITION_SETTLES, (), "position has wandered and does not follow its velocity yet"),
+    (Doubt.MAP_EMPTY, (), "the map has begun anew, and nothing is on it yet"),
     (Doubt.FIX_CHANGED, (), "position steps with the GPS fix"),
     (Doubt.GPS_POOR, ("RTK float", "RTK fixed"), "GPS fix RTK float, RTK fixed needed"),
     (Doubt.GPS_SILENT, (1.0,), "GPS fix not told for over 1 s"),

@@ -14,6 +14,7 @@ from companion.supervision.localization_monitor import (
     CALM_S,
     ONCE_S,
     SETTLED_S,
+    UNSETTLED_S,
     WANDERINGS,
     LocalizationMonitor,
 )
@@ -48,9 +49,11 @@ class Located(Desk):
         self.monitor.take(position, seen)
         return seen
 
-    def hear_origin(self, by_m: float = 0.0) -> None:
+    def hear_origin(self, by_m: float = 0.0, *, settled: bool = True) -> None:
         origin = LocalFrame(PLACE).to_geo(NedPoint(by_m, 0.0))
-        self.monitor.take(OriginSeen(self.now_s, origin), self.run.vehicle)
+        self.monitor.take(OriginSeen(self.now_s, origin), replace(self.run.vehicle, wander=Drift(settled=settled)))
+        self.clock.time_s += 0.001
+        self.report()  # with a scan of now
 
     @property
     def doubt(self) -> Doubt | None:
@@ -102,6 +105,33 @@ def test_a_position_that_wanders_again_and_again_is_not_driven_by(tmp_path: Path
     assert located.doubt is Doubt.POSITION_WANDERS
     located.clock.time_s += CALM_S
     assert located.doubt is None
+
+
+def test_a_position_that_wandered_is_waited_for_until_it_follows_its_velocity_but_not_for_ever(tmp_path: Path) -> None:
+    located = Located(tmp_path)
+    for settled, wait_s in ((True, SETTLED_S), (False, UNSETTLED_S)):
+        located.report(wander=Drift(quick_m=2.0))
+        assert located.doubt is Doubt.POSITION_WANDERED
+        maps = located.executor.maps_begun
+        located.clock.time_s += wait_s - 0.01
+        located.hear_origin(settled=settled)
+        assert located.doubt is (Doubt.POSITION_WANDERED if settled else Doubt.POSITION_SETTLES)
+        assert located.monitor.position_doubted and located.executor.maps_begun == maps
+        located.clock.time_s += 0.02
+        located.hear_origin(settled=settled)
+        assert located.doubt is None and located.executor.maps_begun == maps + 1
+
+
+def test_a_rover_whose_map_was_forgotten_stands_until_something_ahead_is_on_it_again(tmp_path: Path) -> None:
+    located = Located(tmp_path)
+    located.report(jump_m=5.0)
+    located.clock.time_s += SETTLED_S + 0.01
+    blind = replace(vehicle(located.now_s), scan_ahead=vehicle(located.now_s - 0.1).scan_ahead)
+    located.monitor.take(OriginSeen(located.now_s, PLACE), blind)
+    for ahead_s, doubt in ((-0.1, Doubt.MAP_EMPTY), (0.1, None)):
+        heard = replace(blind, scan_ahead=vehicle(located.now_s + ahead_s).scan_ahead)
+        located.monitor.take(GpsSeen(located.now_s, GpsFix.RTK_FIXED, 10), heard)
+        assert located.doubt is doubt and not located.monitor.position_doubted
 
 
 def test_reports_that_are_missing_while_the_position_steps_with_the_fix_end_in_a_new_map(tmp_path: Path) -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from companion.vehicle.dead_reckoning import (
     DRIFT_S,
     MAX_DRIFT_M,
+    MAX_QUICK_M,
+    QUICK_S,
     Drift,
     Reckoning,
     drift_after,
@@ -49,6 +53,23 @@ def test_a_position_that_leaves_its_velocity_drifts(off_m_s: float, noticed: boo
         drift, before = drift_after(drift, before, now), now
         found = found or drift.noticed
     assert found == noticed == (off_m_s * DRIFT_S > MAX_DRIFT_M)
+
+
+@pytest.mark.parametrize(("off_m", "noticed"), [(0.4, False), (0.7, True)])
+def test_a_position_that_steps_aside_is_noticed_and_has_settled_once_it_follows_its_velocity(
+    off_m: float, noticed: bool
+) -> None:
+    """As an EKF that a wrong GPS has led astray: within half a second, and it stays there."""
+    drift, before, found, settled_s = Drift(), None, False, []
+    for led in reports(6.0, 1.0, 1.0):
+        astray_m = off_m * min(max(led.time_s - 2.0, 0.0) / 0.5, 1.0)
+        now = replace(led, north_m=led.north_m + astray_m)
+        drift, before = drift_after(drift, before, now), now
+        found = found or drift.noticed
+        settled_s += [now.time_s] if drift.settled else []
+    assert found == noticed == (off_m > MAX_QUICK_M)
+    unsettled = [t for t in np.arange(0.0, 6.0, STEP_S) if not any(abs(t - s) < STEP_S / 2 for s in settled_s)]
+    assert max(unsettled) == pytest.approx(2.5 + QUICK_S, abs=0.4) and min(settled_s) == pytest.approx(1.0, abs=0.15)
 
 
 def test_a_pause_in_the_reports_starts_the_comparison_again() -> None:
