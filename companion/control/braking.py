@@ -67,11 +67,14 @@ def soonest_s(follows: Following, link_s: float) -> float:
     return max(follows.dead_s, late_s) if late_s > 0.0 else math.inf
 
 
-def for_guard(settings: Settings, waits_s: float | None) -> Settings:
-    """The settings to drive with while a guard on the autopilot waits so long: what is told lasts no longer."""
-    if waits_s is None:
+def for_silence(settings: Settings, told_s: float, waits_s: float | None) -> Settings:
+    """The settings for a companion that falls silent: the autopilot ends its last velocity after ``told_s``.
+
+    A guard that waits for ``waits_s`` ends it sooner; None without one.
+    """
+    lasts_s = told_s if waits_s is None else min(told_s, waits_s + GUARD_SLACK_S)
+    if lasts_s == settings.guidance.velocity_lasts_s:
         return settings
-    lasts_s = min(settings.guidance.velocity_lasts_s, waits_s + GUARD_SLACK_S)
     guidance = settings.guidance.model_copy(update={"velocity_lasts_s": lasts_s})
     return settings.model_copy(update={"guidance": guidance})
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.control.braking import counted_s, for_guard, for_link, late, soonest_s
+from companion.control.braking import counted_s, for_link, for_silence, late, soonest_s
 from companion.control.controller import ControlCommand, Controller
 from companion.control.following import following_of, within_limits
 from companion.control.local_view import LocalView
@@ -70,6 +70,7 @@ from companion.settings import ControllerKind, Settings
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import RunCommand
 from companion.vehicle.events import AckSeen
+from companion.vehicle.motion_limits import velocity_lasts_s
 from companion.vehicle.state import VehicleState
 
 ORIGIN_MOVED_M = 0.2
@@ -130,7 +131,7 @@ class MissionExecutor:
         """Grows whenever what had been mapped is worth nothing any more, or lies elsewhere."""
         self._mission = mission
         self._settings = settings
-        self._counted_for: tuple[int, float, float | None] | None = None
+        self._counted_for: tuple[int, float, float, float | None] | None = None
         self._counted = settings.current
         """The settings with the link's latency and the guard counted in, and what they were made from."""
         self._runner = runner
@@ -507,8 +508,7 @@ class MissionExecutor:
         """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""
         pose = vehicle.pose_at(now_s)
         assert pose is not None
-        guard = vehicle.guard_at(now_s)
-        settings = self._settings_in_force(vehicle.latency_s, None if guard is None else guard.waits_s)
+        settings = self._settings_in_force(vehicle, now_s)
         rate_rad_s = 0.0 if vehicle.attitude is None else vehicle.attitude.yaw_rate_rad_s
         back = vehicle.forward_m_s < -ROLLS_BACK_M_S
         motion = settings.motion
@@ -533,11 +533,15 @@ class MissionExecutor:
         """The settings as they are now, of the controller in force."""
         return settings_in_force(self._settings.current, self._scan, self._mission.rover.turning_radius_m)
 
-    def _settings_in_force(self, link_s: float, waits_s: float | None) -> Settings:
-        """The settings for a link that takes this long, there and back, and a guard that waits so long, or none."""
-        made_from = (self._settings.changes, counted_s(link_s), waits_s)
+    def _settings_in_force(self, vehicle: VehicleState, now_s: float) -> Settings:
+        """The settings for the link as late as it is, for the guard that is there, and the autopilot's own timeout."""
+        guard, link_s = vehicle.guard_at(now_s), vehicle.latency_s
+        waits_s = None if guard is None else guard.waits_s
+        told_s = velocity_lasts_s(vehicle.parameters, self._settings.current.guidance.velocity_lasts_s)
+        made_from = (self._settings.changes, counted_s(link_s), told_s, waits_s)
         if made_from != self._counted_for:
-            self._counted_for, self._counted = made_from, for_guard(for_link(self._given, link_s), waits_s)
+            self._counted_for = made_from
+            self._counted = for_silence(for_link(self._given, link_s), told_s, waits_s)
         return self._counted
 
     def _is_refused(self, now_s: float) -> bool:

@@ -34,7 +34,7 @@ from companion.safety.reasons import Activity, Doubt, EndReason, Reason, RunPhas
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import Command, GuidedPosition, SetMode
 from companion.vehicle.events import AckSeen, Event, RoverMode
-from companion.vehicle.motion_limits import full_throttle_m_s
+from companion.vehicle.motion_limits import full_throttle_m_s, velocity_lasts_s
 from companion.vehicle.state import VehicleState
 
 MakeExecutor = Callable[[MissionLayout, MissionProgress, RangeScan], MissionExecutor]
@@ -171,7 +171,7 @@ class MissionRun:
         assert seen is not None
         self.executor = self._make_executor(layout, progress, seen.scan)
         if self.executor.controller != "points" and self.vehicle.guard_at(now_s) is None:
-            lasts_s = self._settings.current.guidance.velocity_lasts_s
+            lasts_s = velocity_lasts_s(self.vehicle.parameters, self._settings.current.guidance.velocity_lasts_s)
             text = f"No guard on the autopilot: each command must be safe for {lasts_s:g} s, so the rover is slower"
             self._notifier.tell(text, Severity.INFO)
         return self.executor

@@ -1,4 +1,4 @@
-"""The limits monitor: reads the autopilot's limits, by which motions are planned, and what its throttle does.
+"""The limits monitor: reads the autopilot's limits, by which motions are planned, its timeout, and its throttle.
 
 Nouns: limits monitor.
 """
@@ -13,7 +13,7 @@ from companion.safety.watchdogs import Monitor
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import ReadParameter
 from companion.vehicle.events import Event
-from companion.vehicle.motion_limits import CHANGES, CRUISE_THROTTLE, LIMITS, THROTTLE_SCALE
+from companion.vehicle.motion_limits import CHANGES, CRUISE_THROTTLE, LIMITS, THROTTLE_SCALE, TIMEOUT
 from companion.vehicle.state import VehicleState
 
 ASK_S = 1.0
@@ -37,7 +37,7 @@ class LimitsMonitor(Monitor):
     def tick(self, now_s: float) -> None:
         """Ask for what is not known, each second, a few times; then tell that it is assumed."""
         plans = self._settings.current.guidance.controller != "points"
-        needed = dict.fromkeys((*LIMITS, *THROTTLE_SCALE) if plans else THROTTLE_SCALE)
+        needed = dict.fromkeys((TIMEOUT, *LIMITS, *THROTTLE_SCALE) if plans else (TIMEOUT, *THROTTLE_SCALE))
         missing = [name for name in needed if name not in self._vehicle.parameters]
         if not missing or self._vehicle.heartbeat is None or self._told:
             return
@@ -45,7 +45,8 @@ class LimitsMonitor(Monitor):
             return
         if self._tries >= TRIES:
             self._told = True
-            self._notifier.tell(_not_told(missing, plans=plans), Severity.WARNING)
+            if missing != [TIMEOUT]:  # older firmware has none
+                self._notifier.tell(_not_told(missing, plans=plans), Severity.WARNING)
         else:
             self._asked_s, self._tries = now_s, self._tries + 1
             for name in missing:
@@ -54,6 +55,7 @@ class LimitsMonitor(Monitor):
 
 def _not_told(missing: list[str], *, plans: bool) -> str:
     """What is assumed instead. Where motions are planned (``plans``), most of the names are of limits."""
+    missing = [name for name in missing if name != TIMEOUT]
     shipped = [name for name in missing if name in (*CHANGES, CRUISE_THROTTLE) or not plans]
     others = [name for name in missing if name not in shipped]
     parts = [f"{', '.join(shipped)}: taken to be as shipped"] if shipped else []

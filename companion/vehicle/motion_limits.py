@@ -1,7 +1,8 @@
-"""ArduRover's parameters that tell how fast the rover may drive and turn, how fast that changes, and its throttle."""
+"""ArduRover's parameters that tell how fast the rover may drive and turn, how fast that changes, how long it goes on."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 ACCELERATION, DECELERATION, TURN_ACCELERATION = "ATC_ACCEL_MAX", "ATC_DECEL_MAX", "ATC_STR_ACC_MAX"
@@ -14,6 +15,9 @@ CHANGES = (ACCELERATION, DECELERATION, TURN_ACCELERATION)
 LIMITS = (*CHANGES, FASTEST, CRUISE, TURN_RATE)
 THROTTLE_SCALE = (CRUISE, CRUISE_THROTTLE)
 """What tells how fast the rover drives with which throttle."""
+TIMEOUT, LEAST_TIMEOUT_S = "GUID_TIMEOUT", 0.1
+"""Seconds for which the last velocity goes on; less than the second counts as that. Older firmware has no such
+parameter: there it is always 3 s."""
 CRUISE_M_S, CRUISE_PERCENT = 2.0, 50.0
 """Both as ArduRover is shipped."""
 
@@ -27,3 +31,9 @@ def full_throttle_m_s(parameters: Mapping[str, float]) -> float:
     if speed_m_s <= 0.0 or percent <= 0.0:
         speed_m_s, percent = CRUISE_M_S, CRUISE_PERCENT
     return 100.0 * speed_m_s / percent
+
+
+def velocity_lasts_s(parameters: Mapping[str, float], otherwise_s: float) -> float:
+    """How long the last velocity goes on: as the autopilot tells, or ``otherwise_s`` where it does not."""
+    told_s = parameters.get(TIMEOUT, math.nan)
+    return max(told_s, LEAST_TIMEOUT_S) if math.isfinite(told_s) else otherwise_s

@@ -40,7 +40,7 @@ from companion.vehicle.events import (
     ThrottleSeen,
 )
 from companion.vehicle.link_latency import BACK_S, Latency, TimeAnswered, latency_after_answer, latency_after_report
-from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
+from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE, TIMEOUT
 from companion.vehicle.rc_input import Sticks, SticksSeen, sticks_after
 
 EKF_ATTITUDE, EKF_VELOCITY = 1, 2
@@ -50,7 +50,7 @@ EKF_POSITION = 8 | 16
 EKF_CONST_POSITION = 128
 """CONST_POS_MODE must not be set. No other flag counts: GPS_GLITCH alone stops neither ArduRover nor the companion."""
 FENCE = ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS")
-PARAMETERS_KEPT = frozenset((*FENCE, "WP_RADIUS", *LIMITS, *THROTTLE_SCALE))
+PARAMETERS_KEPT = frozenset((*FENCE, "WP_RADIUS", TIMEOUT, *LIMITS, *THROTTLE_SCALE))
 """The parameters that a run needs: the autopilot sends hundreds whenever a ground station lists them."""
 FIRST_BATTERY = 0
 OTHERS_KEPT = 64

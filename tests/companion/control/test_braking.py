@@ -9,12 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.control.braking import (
+    GUARD_SLACK_S,
     blind_distance_m,
     counted_s,
     farthest_m,
     fastest_blind_m_s,
     fastest_within_m,
-    for_guard,
+    for_silence,
     for_link,
     late,
     loop_latency_s,
@@ -91,7 +92,14 @@ def test_it_stands_beyond_a_place_by_a_share_of_the_distance_and_farther_if_it_r
 
 def test_with_a_guard_what_is_told_must_be_safe_until_the_guard_has_acted() -> None:
     """On the real firmware a guard of 300 ms had put HOLD after 317 ms: it looks every 20 ms, and the mode changes."""
-    lasts_s = for_guard(SETTINGS, 0.3).guidance.velocity_lasts_s
+    lasts_s = for_silence(SETTINGS, 3.0, 0.3).guidance.velocity_lasts_s
     assert 0.3 + 0.02 + 0.017 < lasts_s < 0.4
-    assert for_guard(SETTINGS, 9.0).guidance.velocity_lasts_s == SETTINGS.guidance.velocity_lasts_s
-    assert for_guard(SETTINGS, None) is SETTINGS
+    assert for_silence(SETTINGS, 3.0, 9.0).guidance.velocity_lasts_s == SETTINGS.guidance.velocity_lasts_s == 3.0
+    assert for_silence(SETTINGS, 3.0, None) is SETTINGS
+
+
+@pytest.mark.parametrize("told_s", [0.5, 10.0])
+def test_a_velocity_lasts_as_long_as_the_autopilot_says(told_s: float) -> None:
+    """A companion that dies with GUID_TIMEOUT 10 goes on for ten seconds."""
+    assert for_silence(SETTINGS, told_s, None).guidance.velocity_lasts_s == told_s
+    assert for_silence(SETTINGS, told_s, 0.3).guidance.velocity_lasts_s == pytest.approx(0.3 + GUARD_SLACK_S)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.control.braking import GUARD_SLACK_S, for_guard
+from companion.control.braking import GUARD_SLACK_S, for_silence
 from companion.control.following import GUARDED_S
 from companion.core.severity import Severity
 from companion.safety.guard_monitor import GuardMonitor
@@ -79,6 +79,6 @@ def test_what_is_said_is_the_rule_in_force(tmp_path: Path, waits_s: float, says:
     whole.companion.tick()
     texts = [command.text for command in whole.autopilot.taken() if isinstance(command, StatusText)]
     assert [text.startswith(says) for text in texts if "guard" in text.lower()] == [True]
-    lasts_s = for_guard(Settings(), waits_s).guidance.velocity_lasts_s
+    lasts_s = for_silence(Settings(), 3.0, waits_s).guidance.velocity_lasts_s
     assert (lasts_s <= GUARDED_S) is (says == "Guarded: ")
     assert pytest.approx(GUARDED_S - GUARD_SLACK_S) == IN_TIME_S, "what is said is said by the same limit"

@@ -11,10 +11,10 @@ from companion.settings.live_settings import LiveSettings
 from companion.supervision.limits_monitor import TRIES, LimitsMonitor
 from companion.vehicle.commands import ReadParameter
 from companion.vehicle.events import HeartbeatSeen, ParameterSeen
-from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
+from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE, TIMEOUT
 from companion.vehicle.state import VehicleState, fold
 
-PLANS = tuple(dict.fromkeys((*LIMITS, *THROTTLE_SCALE)))
+PLANS = tuple(dict.fromkeys((TIMEOUT, *LIMITS, *THROTTLE_SCALE)))
 """What planned motions need."""
 
 
@@ -58,15 +58,20 @@ def test_one_that_is_never_answered_is_asked_for_a_few_times_and_then_told() -> 
     found = asked("motion-ga", tuple(name for name in PLANS if name != "ATC_STR_RAT_MAX"))
     assert found.names.count(LIMITS[0]) == 1 and found.names.count("ATC_STR_RAT_MAX") == TRIES
     assert found.said == ["The autopilot does not tell ATC_STR_RAT_MAX: taken to be no limit"]
-    several = asked("motion-ga", PLANS[1:-2]).said
+    several = asked("motion-ga", PLANS[2:-2]).said
     assert several == [
         "The autopilot does not tell ATC_ACCEL_MAX, CRUISE_THROTTLE: taken to be as shipped; "
         "ATC_STR_RAT_MAX: taken to be no limit"
     ]
 
 
-def test_without_planned_motions_only_what_its_throttle_does_is_needed() -> None:
-    assert asked("points", THROTTLE_SCALE).names == list(THROTTLE_SCALE)
+def test_without_planned_motions_only_its_timeout_and_what_its_throttle_does_is_needed() -> None:
+    needed = {TIMEOUT, *THROTTLE_SCALE}
+    assert {*asked("points", tuple(needed)).names} == needed
     assert asked("points", ()).said == [
         "The autopilot does not tell CRUISE_SPEED, CRUISE_THROTTLE: taken to be as shipped"
     ]
+
+
+def test_older_firmware_has_no_timeout_that_could_be_told() -> None:
+    assert asked("points", THROTTLE_SCALE).said == []
