@@ -43,6 +43,9 @@ STEADY_S, STEADY_RAD_S, LEAST_RAD_S = 0.3, 0.3, 0.3
 the first. Told one way and the other several times a second, nearly any figure fits, as what is seen is late."""
 LEAST_SHARE, MOST_SHARE = 0.5, 2.0
 """No figure leaves these bounds, of what it began with."""
+LIMITED = "turn_acceleration_rad_s2"
+"""The autopilot itself changes the turn rate no faster than its limit: more than the doubt in that is never believed,
+or a rover that turns a little late would be taken for one that turns fast."""
 ERROR_M_S, ERROR_RAD_S = 0.1, 0.15
 """Differences that are usual."""
 MOST_ERROR = 3.0
@@ -160,7 +163,8 @@ def _fitted(before: ModelEstimate, rows: NDArray[np.float64]) -> ModelEstimate:
             continue
         usual = getattr(began, name)
         for change in CHANGES:
-            value = min(max(getattr(best, name) * (1.0 + change), LEAST_SHARE * usual), MOST_SHARE * usual)
+            most = 1.0 + began.off_model if name == LIMITED else MOST_SHARE
+            value = min(max(getattr(best, name) * (1.0 + change), LEAST_SHARE * usual), most * usual)
             tried = best._replace(**{name: value})
             if (error := _error(tried, began, rows)) < least:
                 best, least = tried, error
