@@ -1,4 +1,4 @@
-"""ArduRover's parameters that tell how fast the rover may drive and turn, how fast that changes, how long it goes on."""
+"""ArduRover's parameters: how fast the rover may drive and turn, how fast that changes, how long a velocity lasts."""
 
 from __future__ import annotations
 

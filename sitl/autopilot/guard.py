@@ -24,6 +24,7 @@ SETPOINTS = {
     "SET_POSITION_TARGET_GLOBAL_INT",
 }
 LIFE = {"HEARTBEAT", *SETPOINTS}
+COMMANDS = {"COMMAND_INT", "COMMAND_LONG"}
 LOOK_US = 20_000
 TELL_US = 500_000
 USUAL_MS, LEAST_MS, MOST_MS = 300.0, 200.0, 3000.0
@@ -41,7 +42,7 @@ class Guard:
         self._component_id = component_id
         self._set_mode = set_mode
         self._watches = self._acted = False
-        self._heard_us = self._told_us = 0
+        self._heard_us = self._told_us = self._looked_us = 0
 
     @property
     def waits_us(self) -> float:
@@ -53,6 +54,7 @@ class Guard:
         """One packet that has arrived."""
         vehicle = self._vehicle
         if message.get_srcSystem() != vehicle.system or message.get_srcComponent() != self._component_id:
+            self._acted &= not _asks_for_mode(message)
             return
         if message.get_type() in LIFE:
             self._heard_us = vehicle.time_us
@@ -63,18 +65,18 @@ class Guard:
         tells_us = self._told_us + TELL_US
         if not self._watches:
             return tells_us
-        looks_us = (int(self._heard_us + self.waits_us) // LOOK_US + 1) * LOOK_US
+        late_us = max(self._heard_us + self.waits_us, self._looked_us)
+        looks_us = (int(late_us) // LOOK_US + 1) * LOOK_US
         return min(tells_us, max(looks_us, self._vehicle.time_us))
 
     def run(self) -> None:
         """Look, act, and tell."""
         vehicle = self._vehicle
+        self._looked_us = vehicle.time_us
         self._watches &= self._is_guided()
         self._acted &= vehicle.armed and vehicle.mode == Mode.HOLD
         if self._watches and vehicle.time_us - self._heard_us > self.waits_us:
-            self._watches, self._acted = False, True
-            self._set_mode(vehicle, Mode.HOLD)
-            vehicle.say(Severity.WARNING, "Guard: companion silent, HOLD")
+            self._act()
         if vehicle.time_us - self._told_us >= TELL_US:
             self._told_us = vehicle.time_us
             told_ms = (-1e-3 if self._acted else 1e-3) * self.waits_us
@@ -82,8 +84,20 @@ class Guard:
             for channel in vehicle.channels.values():
                 channel.send(mavlink.MAVLink_named_value_float_message(vehicle.time_us // 1000, name, told_ms))
 
+    def _act(self) -> None:
+        """HOLD; if it is refused, again 20 ms later."""
+        if self._set_mode(self._vehicle, Mode.HOLD):
+            self._watches, self._acted = False, True
+            self._vehicle.say(Severity.WARNING, "Guard: companion silent, HOLD")
+
     def _is_guided(self) -> bool:
         return self._vehicle.armed and self._vehicle.mode == Mode.GUIDED
+
+
+def _asks_for_mode(message: Any) -> bool:
+    """Whether somebody wants a mode: whatever he wants, HOLD is his from then on."""
+    name = message.get_type()
+    return name == "SET_MODE" or (name in COMMANDS and message.command == mavlink.MAV_CMD_DO_SET_MODE)
 
 
 def guard_of(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool]) -> Guard | None:

@@ -18,7 +18,15 @@ from companion.settings import Settings
 from companion.settings.versions import made_with
 from sitl.cli import experiment_options as given
 from sitl.cli.extras import statistics_fault
-from sitl.experiments.experiment import OFF_MODEL, Checked, Experiment, ExperimentError, ExperimentReport, Options
+from sitl.experiments.experiment import (
+    OFF_MODEL,
+    TIMEOUT_S,
+    Checked,
+    Experiment,
+    ExperimentError,
+    ExperimentReport,
+    Options,
+)
 
 WITH_STATISTICS = ("barn", "gates", "killed-companion", "traffic", "wang-table4")
 EXIT_FAILED = 3
@@ -44,6 +52,7 @@ def experiment(
     guard: given.Guard = False,
     off: given.Off = OFF_MODEL,
     late: given.Late = 0.0,
+    guid_timeout: given.GuidTimeout = TIMEOUT_S,
     outline: given.Outline = None,
     turning_radius: given.TurningRadius = 0.0,
     keep: given.Keep = None,
@@ -61,7 +70,8 @@ def experiment(
         options = Options(
             runs, seed, jobs, maps, tuple(world or ()), given.names_given("--planners", planners), worlds,
             given.names_given("--controllers", controllers), given.names_given("--setups", setups), lidar, guard, off,
-            late, keep, given.names_given("--missions", missions), given.outline_m(outline), turning_radius,
+            late, guid_timeout, keep, given.names_given("--missions", missions), given.outline_m(outline),
+            turning_radius,
         )  # fmt: skip
         given.refuse_unused(name, options)
         _check_keep(keep)

@@ -10,7 +10,7 @@ import typer
 
 from sitl.campaign.campaign_file import MOST_RUNS
 from sitl.cli.named import names_in
-from sitl.experiments.experiment import OFF_MODEL, ExperimentError, Options
+from sitl.experiments.experiment import OFF_MODEL, TIMEOUT_S, ExperimentError, Options
 
 EXPERIMENTS = (
     "adaptive-control-points",
@@ -44,6 +44,7 @@ TAKERS = {
     "--guard": GUARDED,
     "--off": MISMATCHED,
     "--late": ("barn", "controllers", "gates", "killed-companion", "missions"),
+    "--guid-timeout": ("barn", "dead-companion", "gates", "missions"),
     "--outline": ("gates",),
     "--turning-radius": ("driving",),
     "--maps": (
@@ -136,6 +137,14 @@ Late = Annotated[
     float,
     typer.Option(min=0.0, max=2.0, help=f"{_of('--late')}: seconds that a message takes over the link, each way."),
 ]
+GuidTimeout = Annotated[
+    float,
+    typer.Option(
+        min=0.1,
+        max=30.0,
+        help=f"{_of('--guid-timeout')}: seconds for which the autopilot goes on with the last velocity (GUID_TIMEOUT).",
+    ),
+]
 Outline = Annotated[
     str | None,
     typer.Option(
@@ -200,6 +209,7 @@ def refuse_unused(name: str, options: Options) -> None:
         "--guard": options.guard,
         "--off": options.off != OFF_MODEL,
         "--late": options.late_s,
+        "--guid-timeout": options.timeout_s != TIMEOUT_S,
         "--outline": options.outline_m,
         "--turning-radius": options.turning_radius_m,
         "--maps": options.maps,

@@ -25,6 +25,7 @@ from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, R
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from companion.settings.settings import CONTROLLERS
+from companion.vehicle.motion_limits import TIMEOUT
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.experiments import drawing
 from sitl.experiments.barn_measures import SPREAD_HEAD, difficulty_of, spread_rows
@@ -33,6 +34,7 @@ from sitl.experiments.experiment import (
     GUARD,
     OFF_MODEL,
     POINTS,
+    TIMEOUT_S,
     Advance,
     ExperimentError,
     ExperimentReport,
@@ -162,16 +164,17 @@ def drive(
     late_s: float = 0.0,
     lidar: str | None = None,
     settings: Settings | None = None,
+    timeout_s: float = TIMEOUT_S,
 ) -> BarnRun:
     """One run. ``off``: the rover differs by up to this share from what the companion takes it for.
 
     ``late_s``: so long each message takes over the link, each way. ``lidar``: the model of one that the companion reads
-    itself; None: its distances come over MAVLink.
+    itself; None: its distances come over MAVLink. ``timeout_s``: the autopilot's GUID_TIMEOUT.
     """
     start, mission = SimStart(START_M[1], START_M[0], 0.0, SOMEWHERE), mission_of(world)
     drivetrain, limits = off_model(np.random.default_rng((world.number, seed, 30)), off, limits_of(setup))
     guard = {} if controller == POINTS or setup is Setup.STRICT else GUARD
-    parameters = {"WP_SPEED": SPEED_M_S, **RECOMMENDED_PARAMETERS, **limits, **guard}
+    parameters = {"WP_SPEED": SPEED_M_S, **RECOMMENDED_PARAMETERS, TIMEOUT: timeout_s, **limits, **guard}
     lidars = () if lidar is None else (_on_companion(lidar),)
     sensors = SensorSuite() if lidars else SensorSuite(LIDAR)
     plain = Scenario(world.world(), start, sensors, outline_of(mission.rover), parameters, drivetrain=drivetrain)
@@ -416,7 +419,7 @@ def run(options: Options, advance: Advance) -> BarnReport:
     else:
         worlds = standard(read_worlds(options.archive))
     tasks = [
-        (world, name, seed, setup, options.off, options.late_s, options.lidar)
+        (world, name, seed, setup, options.off, options.late_s, options.lidar, None, options.timeout_s)
         for setup, name in pairs
         for seed in range(options.seed, options.seed + options.runs)
         for world in worlds

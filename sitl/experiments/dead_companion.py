@@ -200,7 +200,7 @@ class DeadReport(ExperimentReport):
     @property
     def section_name(self) -> str:
         """See ``ExperimentReport``."""
-        return section_by_rule(NAME, self.options.guard, self._planned)
+        return section_by_rule(NAME, self.options.guard, self._planned) + self.options.timeout_suffix
 
     @property
     def _planned(self) -> int:
@@ -292,7 +292,7 @@ def run(options: Options, advance: Advance) -> DeadReport:
     """
     chosen = {mission.source for mission in shipped(options)}
     drives = [
-        (with_suite(mission, suite), controller, options.guard, options.off)
+        (with_suite(mission, suite), controller, options.guard, options.off, options.timeout_s)
         for controller in chosen_controllers(options, (POINTS,))
         for mission in shipped(replace(options, missions=()))
         for suite in SUITES
@@ -312,10 +312,11 @@ def run(options: Options, advance: Advance) -> DeadReport:
 
 
 def deaths_of(
-    mission: Mission, controller: ControllerKind, guarded: bool, off: float, seed: int, count: int
+    mission: Mission, controller: ControllerKind, guarded: bool, off: float, timeout_s: float, seed: int, count: int
 ) -> list[Death]:
     """One drive, cut off at so many moments, drawn evenly from it. ``off``: where motions are planned."""
-    scenario = scenario_off_model(mission, seed, 0.0 if controller == POINTS else off, guarded=guarded)
+    off = 0.0 if controller == POINTS else off
+    scenario = scenario_off_model(mission, seed, off, guarded=guarded, timeout_s=timeout_s)
     settings = taken_for(controller, NAME)
     told = overheard(mission, seed, settings, scenario)
     moments_s = np.random.default_rng((seed, count)).uniform(told.begin_s, told.end_s, count)

@@ -39,6 +39,8 @@ POINTS: ControllerKind = "points"
 GUARD = {"SCR_ENABLE": 1.0, "SCR_USER1": 300.0}
 """The guard on the autopilot puts HOLD so many milliseconds after the companion's last packet."""
 OFF_MODEL = 0.3
+TIMEOUT_S = 3.0
+"""GUID_TIMEOUT as ArduRover is shipped; older firmware has it fixed."""
 """So far a rover is off what the companion takes it for, at most, unless it is said."""
 START, TARGET = Cell(0, 24), Cell(98, 24)
 """Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""
@@ -76,6 +78,8 @@ class Options:
     """So far the rover is off its model, at most: a share."""
     late_s: float = 0.0
     """So long each message takes over the link, each way."""
+    timeout_s: float = TIMEOUT_S
+    """The autopilot's GUID_TIMEOUT: so long the last velocity goes on."""
     keep: Path | None = None
     """The folder in which the results of single runs are kept; None: nowhere."""
     missions: tuple[str, ...] = ()
@@ -95,6 +99,7 @@ class Options:
         chosen += " --guard" if self.guard else ""
         chosen += "" if self.off == OFF_MODEL else f" --off {self.off:g}"
         chosen += f" --late {self.late_s:g}" if self.late_s else ""
+        chosen += "" if self.timeout_s == TIMEOUT_S else f" --guid-timeout {self.timeout_s:g}"
         chosen += "" if self.outline_m is None else f" --outline {'x'.join(f'{one:g}' for one in self.outline_m)}"
         chosen += f" --turning-radius {self.turning_radius_m:g}" if self.turning_radius_m else ""
         chosen += f" --worlds {self.archive.name}" if self.archive else ""
@@ -107,10 +112,16 @@ class Options:
         return self.off == OFF_MODEL and self.late_s == 0.0
 
     @property
+    def timeout_suffix(self) -> str:
+        """Of the name of a section, where the timeout is another one than usual."""
+        return "" if self.timeout_s == TIMEOUT_S else "-guid-timeout"
+
+    @property
     def mismatch(self) -> str:
         """What is not as the companion expects it, in words."""
         late = f", and each message takes {self.late_s:g} s over the link, each way" if self.late_s else ""
-        return f"off by up to {100.0 * self.off:.0f} % from what the companion takes them for{late}"
+        ends = "" if self.timeout_s == TIMEOUT_S else f"; the autopilot ends a velocity after {self.timeout_s:g} s"
+        return f"off by up to {100.0 * self.off:.0f} % from what the companion takes them for{late}{ends}"
 
 
 def chosen_controllers(options: Options, otherwise: tuple[ControllerKind, ...]) -> tuple[ControllerKind, ...]:
@@ -140,7 +151,9 @@ class ExperimentReport(ABC):
     def section_name(self) -> str:
         """Of its section there. One with another rover or link than usual stands beside the usual one."""
         options: Options | None = getattr(self, "options", None)
-        return self.name if options is None or options.usual else f"{self.name}-off-model"
+        if options is None:
+            return self.name
+        return self.name + ("" if options.usual else "-off-model") + options.timeout_suffix
 
     @abstractmethod
     def tables(self) -> list[Table]:

@@ -14,6 +14,7 @@ from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, R
 from companion.recording.recorder import NullRecorder
 from sitl.experiments.experiment import (
     OFF_MODEL,
+    TIMEOUT_S,
     Advance,
     ExperimentError,
     ExperimentReport,
@@ -90,8 +91,12 @@ def drive(
     late_s: float = 0.0,
     outline: Footprint = OUTLINE,
     guarded: bool = True,
+    timeout_s: float = TIMEOUT_S,
 ) -> GateDrive:
-    """One drive from one side of the wall to the other. ``guarded``: planned motions have the guard."""
+    """One drive from one side of the wall to the other. ``guarded``: planned motions have the guard.
+
+    ``timeout_s``: the autopilot's GUID_TIMEOUT.
+    """
     rover = RoverSpec(outline.radius_m, SPEED_M_S, 0.0, outline)
     rng = np.random.default_rng((seed, 53))
     world = world_of(width_m, angle_deg, float(rng.uniform(-ASIDE_M, ASIDE_M)))
@@ -101,7 +106,7 @@ def drive(
     grid = GridSpec(margin_m=9.0, by_footprint=True)
     mission = Mission(f"gate {width_m:g} m", (goal,), grid, rover, sitl=sitl)
     start = SimStart(0.5 * SIDE_M, 3.0, math.radians(90.0), SOMEWHERE)
-    parameters = {**parameters_for(rover, controller, guarded=guarded), **limits}
+    parameters = {**parameters_for(rover, controller, guarded=guarded, timeout_s=timeout_s), **limits}
     scenario = Scenario(world, start, SENSORS, outline_of(rover), parameters, drivetrain=drivetrain)
     settings = taken_for(controller, NAME)
     run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
@@ -177,7 +182,7 @@ def run(options: Options, advance: Advance) -> GatesReport:
     """Every controller through every gate. Raises ExperimentError for setups that there are not."""
     outline, guarded = outline_of_rover(options), _is_guarded(options)
     tasks = [
-        (name, width_m, angle_deg, seed, options.off, options.late_s, outline, guarded)
+        (name, width_m, angle_deg, seed, options.off, options.late_s, outline, guarded, options.timeout_s)
         for name in chosen_controllers(options, ("motion-ga",))
         for width_m in widths_m(outline)
         for angle_deg in ANGLES_DEG

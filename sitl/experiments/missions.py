@@ -17,6 +17,7 @@ from sitl.experiments.dead_companion import SUITES, shipped, with_suite
 from sitl.experiments.experiment import (
     OFF_MODEL,
     POINTS,
+    TIMEOUT_S,
     Advance,
     ExperimentReport,
     Options,
@@ -62,14 +63,15 @@ def drive(
     guarded: bool,
     off: float = OFF_MODEL,
     late_s: float = 0.0,
+    timeout_s: float = TIMEOUT_S,
 ) -> MissionDrive:
     """One drive. ``guarded``: with the guard on the autopilot.
 
     ``off``: a rover that turns on the spot differs by up to this share from what the companion takes it for.
-    ``late_s``: so long each message takes over the link, each way.
+    ``late_s``: so long each message takes over the link, each way. ``timeout_s``: the autopilot's GUID_TIMEOUT.
     """
     suite = str(mission.sitl.sensors) if mission.sitl is not None else ""
-    scenario = scenario_off_model(mission, seed, off, guarded=guarded)
+    scenario = scenario_off_model(mission, seed, off, guarded=guarded, timeout_s=timeout_s)
     settings = taken_for(controller, NAME)
     run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report, executor = run.run(), run.companion.mission_run.executor
@@ -144,7 +146,7 @@ def _row(mission: str, controller: str, drives: Iterable[MissionDrive]) -> list[
 def run(options: Options, advance: Advance) -> MissionsReport:
     """Every mission, suite, controller and seed."""
     tasks = [
-        (with_suite(mission, suite), controller, seed, options.guard, options.off, options.late_s)
+        (with_suite(mission, suite), controller, seed, options.guard, options.off, options.late_s, options.timeout_s)
         for controller in chosen_controllers(options, (POINTS,))
         for mission in shipped(options)
         for suite in SUITES

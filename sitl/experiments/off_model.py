@@ -12,9 +12,10 @@ import numpy as np
 from companion.mission.mission import Mission, RoverSpec
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
+from companion.vehicle.motion_limits import TIMEOUT
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.parameters import DEFAULTS
-from sitl.experiments.experiment import GUARD, POINTS
+from sitl.experiments.experiment import GUARD, POINTS, TIMEOUT_S
 from sitl.plant.rover import SIM_ROVER, Drivetrain
 from sitl.scenario import Scenario, scenario_from_mission
 
@@ -50,10 +51,12 @@ def taken_for(controller: str, name: str, chosen: Mapping[str, object] | None = 
     return parse_settings({"guidance": {"controller": controller}, "motion": motion, **(chosen or {})}, name)
 
 
-def parameters_for(rover: RoverSpec, controller: str, *, guarded: bool = True) -> dict[str, float]:
+def parameters_for(
+    rover: RoverSpec, controller: str, *, guarded: bool = True, timeout_s: float = TIMEOUT_S
+) -> dict[str, float]:
     """Of the autopilot, as recommended. ``guarded``: with the guard where motions are planned."""
     guard = GUARD if guarded and controller != POINTS else {}
-    return {"WP_SPEED": rover.cruise_speed_m_s, **RECOMMENDED_PARAMETERS, **guard}
+    return {"WP_SPEED": rover.cruise_speed_m_s, **RECOMMENDED_PARAMETERS, TIMEOUT: timeout_s, **guard}
 
 
 def off_model(rng: np.random.Generator, share: float, limits: Limits = SHIPPED) -> tuple[Drivetrain, dict[str, float]]:
@@ -76,14 +79,16 @@ def off_model(rng: np.random.Generator, share: float, limits: Limits = SHIPPED) 
     return drivetrain, parameters
 
 
-def scenario_off_model(mission: Mission, seed: int, off: float, *, guarded: bool) -> Scenario:
+def scenario_off_model(
+    mission: Mission, seed: int, off: float, *, guarded: bool, timeout_s: float = TIMEOUT_S
+) -> Scenario:
     """What the mission is driven in: a rover off its model by up to this share, if it turns on the spot.
 
-    ``guarded``: with the guard on the autopilot.
+    ``guarded``: with the guard on the autopilot, which ends a velocity after ``timeout_s``.
     """
     scenario = scenario_from_mission(mission)
     if off and mission.rover.turning_radius_m <= 0.0:
         drivetrain, limits = off_model(np.random.default_rng((seed, 54)), off)
         scenario = replace(scenario, drivetrain=drivetrain, parameters={**scenario.parameters, **limits})
     guard = GUARD if guarded else {}
-    return replace(scenario, parameters={**scenario.parameters, **guard})
+    return replace(scenario, parameters={**scenario.parameters, TIMEOUT: timeout_s, **guard})

@@ -17,11 +17,14 @@ from sitl.autopilot.guard import LOOK_US, Guard, guard_of
 from sitl.autopilot.state import Mode
 
 AUTOPILOT_OF_THE_SCRIPT = b"""
+accepts = true
 now_ms, mode, armed, queue, wanted, told, names, texts, parameters = 0, 0, false, {}, {}, {}, {}, {}, {}
 function millis() return { toint = function() return now_ms end } end
-vehicle = { get_mode = function() return mode end, set_mode = function(_, new) mode = new return true end }
+vehicle = { get_mode = function() return mode end, set_mode = function(_, new) if accepts then mode = new end return accepts end }
 arming = { is_armed = function() return armed end }
 param = { get = function(_, name) return parameters[name] end }
+switch_us = 1500
+rc = { get_pwm = function(_, channel) return channel == 8 and switch_us or nil end }
 gcs = {
   send_text = function(_, severity, text) texts[#texts + 1] = text end,
   send_named_float = function(_, name, value) told[#told + 1] = value names[#names + 1] = name end,
@@ -35,6 +38,10 @@ mavlink = {
 SETPOINT = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 8, 1511, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0)
 LIFE = mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 0, 3)
 OTHER = mavlink.MAVLink_timesync_message(0, 1)
+HOLD_LONG = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_DO_SET_MODE, 0, 1, 4, 0, 0, 0, 0, 0)
+HOLD_INT = mavlink.MAVLink_command_int_message(1, 1, 0, mavlink.MAV_CMD_DO_SET_MODE, 0, 0, 1, 4, 0, 0, 0, 0, 0)
+HOLD_SET = mavlink.MAVLink_set_mode_message(1, 1, 4)
+ARM = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
 
 
 def packed(message: Any, component: int = 191, system: int = 1) -> bytes:
@@ -51,6 +58,7 @@ class Script:
         self.values = self.lua.globals()
         self.values[b"parameters"][b"SCR_USER1"] = waits_ms
         self.values[b"parameters"][b"MAV_SYSID"] = 1
+        self.values[b"parameters"][b"MODE_CH"] = 8.0
         self._update = self.lua.execute(script(component).encode())[0]
 
     def hear(self, raw: bytes) -> None:
@@ -65,6 +73,10 @@ class Script:
 
     def put(self, mode: int, armed: bool) -> None:
         self.values[b"mode"], self.values[b"armed"] = mode, armed
+
+    def accepts(self, accepts: bool) -> None:
+        """Whether HOLD is put when it is asked for."""
+        self.values[b"accepts"] = accepts
 
     @property
     def mode(self) -> int:
@@ -90,6 +102,7 @@ class Simulated:
     vehicle: Any = field(init=False)
     told_ms: float | None = None
     name: bytes = b""
+    accepted: bool = True
 
     def __post_init__(self) -> None:
         parameters = {"SCR_USER1": self.waits_ms}
@@ -104,8 +117,12 @@ class Simulated:
         self.told_ms, self.name = message.value, message.name.encode()
 
     def _set_mode(self, vehicle: Any, mode: int) -> bool:
-        vehicle.mode = int(mode)
-        return True
+        if self.accepted:
+            vehicle.mode = int(mode)
+        return self.accepted
+
+    def accepts(self, accepts: bool) -> None:
+        self.accepted = accepts
 
     def hear(self, raw: bytes) -> None:
         self.guard.hear(self._parser.parse_char(raw))
@@ -149,19 +166,51 @@ def test_a_companion_that_falls_silent_while_it_drives_is_followed_by_hold(guard
     assert guard.mode == Mode.HOLD
 
 
-def test_hold_that_is_refused_is_asked_for_again_and_is_not_called_the_guards_doing() -> None:
+def test_hold_that_is_refused_is_asked_for_again_and_is_not_called_the_guards_doing(guard: Guards) -> None:
+    guard.accepts(False)
+    looks(guard, 0.5, 0.1, packed(SETPOINT))
+    looks(guard, 1.5)
+    assert guard.mode == Mode.GUIDED and guard.told_ms == 300.0
+    guard.accepts(True)
+    looks(guard, 0.02)
+    assert guard.mode == Mode.HOLD
+    looks(guard, 0.6)
+    assert guard.told_ms == -300.0
+
+
+def test_while_hold_is_refused_the_simulators_guard_looks_every_20_ms_and_no_sooner() -> None:
+    there = Simulated()
+    there.put(Mode.GUIDED, True)
+    there.accepts(False)
+    looks(there, 0.5, 0.1, packed(SETPOINT))
+    looks(there, 0.5)
+    assert there.guard.due_us() == there.vehicle.time_us + LOOK_US
+
+
+@pytest.mark.parametrize("message", [HOLD_LONG, HOLD_INT, HOLD_SET])
+def test_a_hold_that_a_person_asks_for_as_well_is_not_its_doing_any_more(guard: Guards, message: Any) -> None:
+    """The mode does not change, but a companion that is resumed must not take the rover from him."""
+    looks(guard, 0.5, 0.1, packed(SETPOINT))
+    looks(guard, 1.5)
+    guard.hear(packed(ARM, component=190, system=255))
+    looks(guard, 0.6)
+    assert guard.told_ms == -300.0
+    guard.hear(packed(message, component=190, system=255))
+    looks(guard, 0.6)
+    assert guard.mode == Mode.HOLD and guard.told_ms == 300.0
+
+
+def test_nor_is_one_in_which_a_pilot_moved_the_mode_switch() -> None:
     there = Script()
     there.put(Mode.GUIDED, True)
-    there.lua.execute(b"accepts = false vehicle.set_mode = function(_, new) if accepts then mode = new end "
-                       b"return accepts end")  # fmt: skip
     looks(there, 0.5, 0.1, packed(SETPOINT))
     looks(there, 1.5)
-    assert there.mode == Mode.GUIDED and there.told_ms == 300.0
-    there.lua.execute(b"accepts = true")
-    looks(there, 0.02)
-    assert there.mode == Mode.HOLD
+    there.lua.execute(b"switch_us = 1520")  # noise
     looks(there, 0.6)
     assert there.told_ms == -300.0
+    there.lua.execute(b"switch_us = 1900")
+    looks(there, 0.6)
+    assert there.mode == Mode.HOLD and there.told_ms == 300.0
 
 
 def test_it_asks_for_a_queue_with_room_for_all_that_it_listens_to() -> None:
@@ -269,8 +318,12 @@ def test_the_simulators_guard_watches_the_component_of_the_script_that_was_uploa
 
 STEPS = st.one_of(
     st.tuples(
-        st.just("hear"), st.sampled_from([SETPOINT, LIFE, OTHER]), st.sampled_from([191, 190]), st.integers(1, 2)
+        st.just("hear"),
+        st.sampled_from([SETPOINT, LIFE, OTHER, HOLD_LONG, HOLD_SET]),
+        st.sampled_from([191, 190]),
+        st.integers(1, 2),
     ),
+    st.tuples(st.just("accepts"), st.booleans()),
     st.tuples(st.just("put"), st.sampled_from([0, 4, 10, 15, 15, 15]), st.sampled_from([True, True, False])),
     st.tuples(st.just("wait"), st.integers(1, 25)),
 )
@@ -290,6 +343,8 @@ def test_script_and_simulator_do_the_same(steps: list[tuple[Any, ...]], waits_ms
                 case ("put", mode, armed):
                     one.put(mode, armed)
                     one.look()
+                case ("accepts", accepts):
+                    one.accepts(accepts)
                 case ("wait", count):
                     looks(one, 0.02 * count)
         assert guards[0].mode == guards[1].mode

@@ -188,7 +188,9 @@ def test_turning_to_and_fro_tells_nothing_of_how_much_a_rover_turns(seed: int) -
 
 def test_no_turn_rate_is_believed_to_change_faster_than_the_autopilot_may_let_it() -> None:
     """It slews the rate itself; a rover that only obeys sooner fits a faster change as well."""
-    found = [watched(AS_SHIPPED._replace(turn_acceleration_rad_s2=turns), 30.0).estimate.figures for turns in (1.5, 6.0)]
+    found = [
+        watched(AS_SHIPPED._replace(turn_acceleration_rad_s2=turns), 30.0).estimate.figures for turns in (1.5, 6.0)
+    ]
     most = AS_SHIPPED.turn_acceleration_rad_s2 * (1.0 + AS_SHIPPED.off_model)
     assert found[0].turn_acceleration_rad_s2 == pytest.approx(1.5, rel=0.2)
     assert found[1].turn_acceleration_rad_s2 == pytest.approx(most)

@@ -53,18 +53,21 @@ def test_gates_are_as_much_wider_whatever_the_rover_is_and_the_command_names_it(
 
 
 def test_gates_are_driven_with_the_guard_or_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[bool] = []
+    asked: list[tuple[bool, float]] = []
 
     def quick(*task: Any) -> GateDrive:
-        asked.append(task[-1])
+        asked.append(task[-2:])
         return GateDrive("motion-ga", 0.9, 0.0, 0, True, 0, 9.0)
 
     monkeypatch.setattr(gates, "drive", quick)
     for setups, guarded in (("guarded", True), ("strict", False)):
         report = gates.run(Options(runs=1, setups=(setups,)), lambda done, of: None)
-        assert set(asked) == {guarded} and ("no guard" in report.section()) is not guarded
+        assert set(asked) == {(guarded, 3.0)} and ("no guard" in report.section()) is not guarded
         assert report.section_name == ("gates" if guarded else "gates-strict")
         asked.clear()
+    report = gates.run(Options(runs=1, setups=("strict",), timeout_s=1.0), lambda done, of: None)
+    assert set(asked) == {(False, 1.0)} and report.section_name == "gates-guid-timeout-strict"
+    assert "--guid-timeout 1" in report.section() and "ends a velocity after 1 s" in report.section()
     for wrong in ("jackal", "guarded,strict"):
         refused = CliRunner().invoke(app, ["experiment", "gates", "--setups", wrong])
         assert refused.exit_code == 2 and f"--setups {wrong}: gates take guarded or strict" in refused.output
