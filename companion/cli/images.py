@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.cli.inputs import replaced
 from companion.control.motion_controller import MotionChoice
-from companion.control.motion_kernels import BLOCKED_S, MotionGround, MotionProblem, way_of
+from companion.control.motion_kernels import BLOCKED_S, MotionGround, way_of
 from companion.core.frames import NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.planning.problem import Path as GridPath
@@ -115,6 +117,9 @@ def save_decision(file: Path, why: Explanation) -> None:
 
 MOTIONS_M = 6.0
 """So far round the rover the picture of motions reaches."""
+DISC_COLOUR = (120, 150, 120)
+DISC_LINE: Mapping[str, Any] = {"edgecolor": tuple(part / 255.0 for part in DISC_COLOUR), "linewidth": 1.0,
+                                "linestyle": ":"}  # fmt: skip
 TOUCHING_COLOUR, CHEAP_COLOUR, DEAR_COLOUR = (235, 160, 155), (40, 110, 200), (190, 215, 240)
 
 
@@ -142,13 +147,17 @@ def save_motions(file: Path, choice: MotionChoice, title: str) -> None:
         red, green, blue = (dear + share**3 * (cheap - dear)).astype(int).tolist()
         line(choice.found.judged[one], (red, green, blue), 1.8)
     line(choice.found.motion, TAKEN_COLOUR, 4.5)
-    _body(figure, problem, at)
+    _body(figure, choice, at)
     figure.key(_rgb(TAKEN_COLOUR), f"chosen: cost {choice.found.cost_s:.2f} s")
-    for colour, label in ((CHEAP_COLOUR, "cheap"), (DEAR_COLOUR, "dear"), (TOUCHING_COLOUR, "touches something")):
-        figure.key(_rgb(colour), label)
-    for colour, label in ((START_COLOUR, "rover"), (OBSTACLE_COLOUR, "obstacle")):
-        figure.key(_rgb(colour), label)
-    figure.key(_rgb(UNSEEN_COLOUR), "not seen yet, or off the ground looked at")
+    figure.key(_rgb(CHEAP_COLOUR), "cheap")
+    figure.key(_rgb(DEAR_COLOUR), "dear")
+    if len(free) < len(order):
+        figure.key(_rgb(TOUCHING_COLOUR), "touches something")
+    figure.key(_rgb(START_COLOUR), "rover, its front filled")
+    if not choice.outline.is_circle:
+        figure.key(_rgb(DISC_COLOUR), "discs that stand for it")
+    figure.key(_rgb(OBSTACLE_COLOUR), "obstacle")
+    figure.key(_rgb(UNSEEN_COLOUR), "not seen yet, or not looked at")
     with replaced(file) as new:
         figure.save(new, f"{title}: {len(order)} motions of {problem.horizon_s:g} s")
 
@@ -238,15 +247,27 @@ def _show_round(figure: MapFigure, ground: MotionGround, corner: NedPoint) -> No
     _show(figure, pixels, Extent(corner.east_m, east_m, corner.north_m, north_m))
 
 
-def _body(figure: MapFigure, problem: MotionProblem, at: NedPoint) -> None:
-    """The discs that cover the rover's outline, and where it points."""
-    from matplotlib.patches import Circle
+def _body(figure: MapFigure, choice: MotionChoice, at: NedPoint) -> None:
+    """The rover's outline with its front filled, and the discs by which its motions are judged."""
+    from matplotlib.patches import Circle, Polygon
 
-    body, heading_rad = problem.body, problem.start.heading_rad
+    body, outline, heading_rad = choice.problem.body, choice.outline, choice.problem.start.heading_rad
     ahead = np.array((math.cos(heading_rad), math.sin(heading_rad)))
+    right = np.array((-math.sin(heading_rad), math.cos(heading_rad)))
+
+    def place(ahead_m: float, right_m: float) -> tuple[float, float]:
+        north_m, east_m = _row(at)[0] + ahead_m * ahead + right_m * right
+        return float(east_m), float(north_m)
+
     for ahead_m in body.ahead_m.tolist():
-        north_m, east_m = _row(at)[0] + ahead_m * ahead
-        disc = Circle((east_m, north_m), body.radius_m, fill=False, edgecolor=_rgb(START_COLOUR), linewidth=2.5)
-        disc.set_zorder(6)
-        figure.axes.add_patch(disc)
-    _line(figure, _row(at) + np.outer((0.0, body.around_m), ahead), START_COLOUR, 3.5)
+        own = {"edgecolor": _rgb(START_COLOUR), "linewidth": 2.5} if outline.is_circle else DISC_LINE
+        figure.axes.add_patch(Circle(place(ahead_m, 0.0), body.radius_m, fill=False, zorder=6, **own))
+    half_m = outline.half_width_m
+    if not outline.is_circle:
+        corners = [(outline.front_m, half_m), (outline.front_m, -half_m), (-outline.rear_m, -half_m),
+                   (-outline.rear_m, half_m)]  # fmt: skip
+        ends = [place(*corner) for corner in corners]
+        figure.axes.add_patch(Polygon(ends, fill=False, edgecolor=_rgb(START_COLOUR), linewidth=2.5, zorder=7))
+    wide_m = 0.7 * half_m
+    nose = [place(outline.front_m, 0.0), place(0.4 * outline.front_m, wide_m), place(0.4 * outline.front_m, -wide_m)]
+    figure.axes.add_patch(Polygon(nose, facecolor=_rgb(START_COLOUR), edgecolor="none", zorder=7))

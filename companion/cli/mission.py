@@ -16,7 +16,7 @@ from companion.cli.inputs import EXIT_BAD_INPUT, SkipUnknown, usable_settings
 from companion.cli.source import warn_of_places, warning
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
-from companion.executive.controller_choice import settings_for
+from companion.executive.controller_choice import another_controller, settings_for
 from companion.executive.open_gaps import map_at_start, open_gap_m
 from companion.mapping.evidence_map import EvidenceMap
 from companion.mapping.map_files import MapError, load_map
@@ -61,13 +61,15 @@ def check(
         if world is not None:
             check_start(mission, world)
         _check_start_known(mission)
-        settings = _in_force(settings, mission)
+        asked, settings = settings.guidance.controller, _in_force(settings, mission)
         resolved = _resolved(mission, settings)
     except (MissionError, MapError, SettingsError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     show(mission, settings, maps, Console(highlight=False))
     warn_of_places(mission, lambda line: typer.echo(warning(line)))
+    if text := another_controller(asked, settings.guidance.controller, narrow_sight=_has_beams(mission)):
+        typer.echo(warning(text))
     for line in _doubtful_in(world, mission, resolved):
         typer.echo(warning(line))
 

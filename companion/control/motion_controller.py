@@ -102,6 +102,7 @@ class MotionChoice:
     found: Found
     told: ToldVelocity
     corner: NedPoint
+    outline: Footprint
     ahead: ControlCommand | None = None
 
 
@@ -109,6 +110,7 @@ class MotionController:
     """Remembers the ground it looked at."""
 
     def __init__(self, footprint: Footprint, planner: MotionPlanner) -> None:
+        self._outline = footprint
         places_m, radius_m = footprint.discs()
         self._body = Body(places_m, radius_m, float(np.abs(places_m).max()) + radius_m)
         self._planner = planner
@@ -200,7 +202,7 @@ class MotionController:
         self._standstill.told(told.speed_m_s, view, guarded=_alone_s(view) == 0.0)
         assert self._window is not None
         ahead = self._position.faster_than(told.speed_m_s, path, view)
-        self.choice = MotionChoice(now_s, problem, found, told, self._window.corner, ahead)
+        self.choice = MotionChoice(now_s, problem, found, told, self._window.corner, self._outline, ahead)
         if ahead is not None:
             return ahead
         if abs(told.speed_m_s) < 1e-6:

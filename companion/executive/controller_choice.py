@@ -20,6 +20,14 @@ def controller_in_force(kind: ControllerKind, *, narrow_sight: bool, turning_rad
     return "points" if narrow_sight or turning_radius_m > 0.0 else kind
 
 
+def another_controller(asked: ControllerKind, used: ControllerKind, *, narrow_sight: bool) -> str:
+    """For people: what leads the rover instead, and why; empty where nothing else does."""
+    if used == asked:
+        return ""
+    why = "single beams see too little" if narrow_sight else "the rover turns in arcs"
+    return f"guidance.controller: driving with {used}, not {asked}: {why}"
+
+
 def settings_in_force(settings: Settings, scan: RangeScan | None, turning_radius_m: float) -> Settings:
     """The settings of the controller in force. ``scan``: any one of the rover's sensor; None: not heard yet."""
     narrow = scan is not None and scan.is_narrow

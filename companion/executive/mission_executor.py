@@ -26,7 +26,7 @@ from companion.core.severity import Severity, TextSink
 from companion.executive.command_progress import START, CommandProgress, CommandResult, names
 from companion.executive.command_progress import carried as carried_commands
 from companion.executive.command_sender import CommandSender, place_name
-from companion.executive.controller_choice import settings_in_force
+from companion.executive.controller_choice import another_controller, settings_in_force
 from companion.executive.goal_driver import GoalDriver, controller_for
 from companion.executive.laps import LapStart, LapSummary, Odometer, lap_summary
 from companion.executive.mission_layout import MissionLayout, apart_m, carried, fenced_again, lay_again, seen_ground
@@ -163,9 +163,7 @@ class MissionExecutor:
             notifier.tell(text, Severity.WARNING)
         self.controller: ControllerKind = given.guidance.controller
         """The one in force."""
-        if self.controller != asked:
-            why = "single beams see too little" if scan.is_narrow else "the rover turns in arcs"
-            text = f"guidance.controller: driving with {self.controller}, not {asked}: {why}"
+        if text := another_controller(asked, self.controller, narrow_sight=scan.is_narrow):
             notifier.tell(text, Severity.WARNING)
         searcher = PathSearcher(make_planner(given.navigator.planner, given.planner), rng)
         self.driver = GoalDriver(self._controller(rng), searcher, runner)

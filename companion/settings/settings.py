@@ -168,7 +168,7 @@ class GuidanceSettings(Section):
         3.0,
         gt=0.0,
         le=30.0,
-        description="the autopilot stops the rover this long after the last velocity command (ArduRover: 3 s)",
+        description="the autopilot stops the rover this long after the last velocity, if it does not tell GUID_TIMEOUT",
     )
     overshoot_m: float = Field(
         0.35, ge=0.0, description="how far beyond a guided position the rover may stop (ArduRover: 0.30 m)"
@@ -239,6 +239,15 @@ class MotionSettings(Section):
     off_model_known: float = Field(0.1, ge=0.0, le=0.9, description="... and by this one once they are known")
     turn_rad_s: float = Field(1.5, gt=0.0, le=10.0, description="the fastest turn that is told")
     backwards_m_s: float = Field(0.5, ge=0.0, le=10.0, description="the fastest speed backwards that is told")
+
+    @model_validator(mode="after")
+    def _surer_once_known(self) -> Self:
+        if self.off_model_known > self.off_model and "off_model_known" in self.model_fields_set:
+            raise ValueError(
+                f"off_model_known {self.off_model_known:g} lies above off_model {self.off_model:g}; "
+                "a rover that is known differs less, not more"
+            )
+        return self
 
 
 class SteeringSettings(Section):

@@ -80,6 +80,10 @@ def experiment(
     except (ExperimentError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
+    except KeyboardInterrupt:
+        if keep is not None:
+            typer.echo(f"what is done is kept in {keep}; the same command goes on", err=True)
+        raise
     if isinstance(report, Checked) and report.failure:
         typer.echo(f"experiment {name}: {report.failure}", err=True)
         raise typer.Exit(EXIT_FAILED)

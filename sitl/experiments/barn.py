@@ -418,6 +418,8 @@ def run(options: Options, advance: Advance) -> BarnReport:
         worlds = tuple(made_world(number) for number in range(MADE))
     else:
         worlds = standard(read_worlds(options.archive))
+        for world in worlds:
+            difficulty_of(world)  # one without a way is said before hours of driving
     tasks = [
         (world, name, seed, setup, options.off, options.late_s, options.lidar, None, options.timeout_s)
         for setup, name in pairs

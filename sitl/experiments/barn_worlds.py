@@ -10,11 +10,14 @@ Frame of the benchmark: x to the right, y ahead, metres. World frame: north = y,
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from companion.core.grid import Cell
@@ -82,9 +85,12 @@ class BarnWorld:
 def read_worlds(file: Path) -> list[BarnWorld]:
     """The worlds of a file, in its order. Raises ExperimentError."""
     try:
-        with np.load(file) as archive:
-            worlds = [
-                BarnWorld(int(number), np.asarray(lattice, dtype=np.bool_), _path_m(archive[f"path_{number}"]))
+        loaded = np.load(file)
+        if not isinstance(loaded, NpzFile):
+            raise ValueError("a single array")
+        with loaded as archive:
+            read = [
+                (int(number), np.asarray(lattice), np.asarray(archive[f"path_{number}"]))
                 for number, lattice in zip(archive["number"], archive["lattice"], strict=True)
             ]
     except OSError as error:
@@ -93,15 +99,31 @@ def read_worlds(file: Path) -> list[BarnWorld]:
         raise ExperimentError(
             f"{file}: no archive of BARN worlds; give a .npz with the arrays number, lattice and path_NUMBER"
         ) from error
-    if not worlds:
+    if not read:
         raise ExperimentError(f"{file}: has no world")
-    for world in worlds:
-        if world.lattice.shape != (ROWS, COLUMNS):
-            raise ExperimentError(
-                f"{file}: the lattice of world {world.number} has the shape {world.lattice.shape}; "
-                f"one of {ROWS} x {COLUMNS} cells is needed"
-            )
-    return worlds
+    twice = [number for number, count in Counter(number for number, _, _ in read).items() if count > 1]
+    if twice:
+        raise ExperimentError(f"{file}: has world {twice[0]} more than once")
+    for number, lattice, path in read:
+        if fault := _lattice_fault(lattice) or _path_fault(path):
+            raise ExperimentError(f"{file}: world {number}: {fault}")
+    return [BarnWorld(number, lattice.astype(np.bool_), _path_m(path)) for number, lattice, path in read]
+
+
+def _lattice_fault(lattice: NDArray[Any]) -> str:
+    """What is wrong with it; empty for nothing."""
+    if lattice.shape != (ROWS, COLUMNS):
+        return f"its lattice has the shape {lattice.shape}; one of {ROWS} x {COLUMNS} cells is needed"
+    if not np.all((lattice == 0) | (lattice == 1)):
+        return "its lattice has values other than 0 (free) and 1 (a cylinder)"
+    return ""
+
+
+def _path_fault(path: NDArray[Any]) -> str:
+    """What is wrong with it; empty for nothing."""
+    if path.ndim != 2 or path.shape[1] != 2 or len(path) < 2:
+        return f"its path has the shape {path.shape}; two or more steps, column and row, are needed"
+    return "" if np.issubdtype(path.dtype, np.number) and np.all(np.isfinite(path)) else "its path has no numbers"
 
 
 def made_world(seed: int) -> BarnWorld:

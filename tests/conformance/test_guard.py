@@ -20,7 +20,8 @@ AUTOPILOT_OF_THE_SCRIPT = b"""
 accepts = true
 now_ms, mode, armed, queue, wanted, told, names, texts, parameters = 0, 0, false, {}, {}, {}, {}, {}, {}
 function millis() return { toint = function() return now_ms end } end
-vehicle = { get_mode = function() return mode end, set_mode = function(_, new) if accepts then mode = new end return accepts end }
+vehicle = { get_mode = function() return mode end }
+function vehicle:set_mode(new) if accepts then mode = new end return accepts end
 arming = { is_armed = function() return armed end }
 param = { get = function(_, name) return parameters[name] end }
 switch_us = 1500

@@ -330,3 +330,12 @@ def test_a_size_of_the_world_that_is_none_is_left_to_the_simulator(tmp_path: Pat
     path.write_text('[[target]]\nnorth_m = 1\neast_m = 2\n[sitl]\nworld = "w.toml"\nstart = [3, 3]\n')
     result = CliRunner().invoke(app, ["mission", "check", str(path)])
     assert result.exit_code == 0, result.output
+
+
+def test_it_says_that_another_controller_will_lead_the_rover(tmp_path: Path) -> None:
+    settings = tmp_path / "faster.toml"
+    settings.write_text('[guidance]\ncontroller = "motion-ga"\n')
+    for name, said in (("ackermann.toml", True), ("clutter.toml", False)):
+        output = CliRunner().invoke(app, ["mission", "check", str(MISSIONS / name), "--settings", str(settings)]).output
+        text = "warning: guidance.controller: driving with points, not motion-ga: the rover turns in arcs"
+        assert (text in output) is said, output

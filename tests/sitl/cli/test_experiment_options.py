@@ -87,3 +87,13 @@ def test_tables_are_whole_where_there_is_no_terminal(
     assert result.exit_code == 0
     heads = next(line for line in result.stdout.splitlines() if "gate m" in line or "…" in line)
     assert all(head in heads for head in gates.HEAD) == whole and (drives[0].controller in result.stdout) == whole
+
+
+def test_ctrl_c_says_that_what_is_kept_is_not_lost(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(gates, "run", stopped)
+    result = CliRunner().invoke(app, ["experiment", "gates", "--keep", str(tmp_path)])
+    assert result.exit_code == 130
+    assert f"what is done is kept in {tmp_path}; the same command goes on" in result.output

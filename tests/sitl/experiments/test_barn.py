@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import astuple, replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -270,11 +270,42 @@ def test_barn_has_ten_seeds_if_nothing_is_said(
 def test_a_lattice_of_another_shape_is_refused_in_one_line(tmp_path: Path, shape: tuple[int, ...]) -> None:
     steps = np.zeros((2, 2), np.int64)
     np.savez(tmp_path / "w.npz", number=np.array([6]), lattice=np.zeros((1, *shape), np.bool_), path_6=steps)
-    with pytest.raises(ExperimentError, match=r"w\.npz: the lattice of world 6 has the shape .*; one of 64 x 30 cells"):
+    with pytest.raises(ExperimentError, match=r"w\.npz: world 6: its lattice has the shape .*; one of 64 x 30 cells"):
         read_worlds(tmp_path / "w.npz")
-    np.savez(tmp_path / "w.npz", number=np.array([6]), lattice=np.zeros((1, 64, 30), np.bool_), path_6=steps[0])
-    with pytest.raises(ExperimentError, match=r"w\.npz: no archive of BARN worlds"):
+
+
+EMPTY, WAY = np.zeros((1, 64, 30), np.bool_), np.array([[14, 0], [14, 1]])
+
+
+@pytest.mark.parametrize(
+    ("arrays", "says"),
+    [
+        ({"path_6": WAY[0]}, r"world 6: its path has the shape \(2,\)"),
+        ({"path_6": WAY[:1]}, r"world 6: its path has the shape \(1, 2\)"),
+        ({"path_6": np.full((3, 2), np.nan)}, "world 6: its path has no numbers"),
+        ({"path_6": WAY, "lattice": EMPTY + 0.5}, "world 6: its lattice has values other than 0"),
+        ({"path_6": WAY, "lattice": np.repeat(EMPTY, 2, 0), "number": np.array([6, 6])}, "has world 6 more than once"),
+        ({}, "no archive of BARN worlds"),
+    ],
+)
+def test_worlds_that_cannot_be_right_are_refused_in_one_line(tmp_path: Path, arrays: dict[str, Any], says: str) -> None:
+    np.savez(tmp_path / "w.npz", **{"number": np.array([6]), "lattice": EMPTY, **arrays})
+    with pytest.raises(ExperimentError, match=rf"w\.npz: {says}"):
         read_worlds(tmp_path / "w.npz")
+
+
+def test_a_single_array_is_no_archive(tmp_path: Path) -> None:
+    np.save(tmp_path / "w.npy", EMPTY[0])
+    with pytest.raises(ExperimentError, match=r"w\.npy: no archive of BARN worlds"):
+        read_worlds(tmp_path / "w.npy")
+
+
+def test_a_world_without_a_way_is_refused_before_anything_is_driven(tmp_path: Path) -> None:
+    np.savez(tmp_path / "w.npz", number=np.array([6]), lattice=~EMPTY, path_6=WAY)
+    driven: list[int] = []
+    with pytest.raises(ExperimentError, match="world 6: no way from start to goal"):
+        run(Options(1, archive=tmp_path / "w.npz"), lambda done, total: driven.append(done))
+    assert driven == []
 
 
 @pytest.mark.parametrize("content", [b"", b"no archive"])
