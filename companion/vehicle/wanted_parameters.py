@@ -100,8 +100,8 @@ def _table(speed_m_s: float) -> Iterable[WantedParameter]:
     yield WantedParameter("AVOID_ENABLE", recommended["AVOID_ENABLE"], INT8, why)
     why = "with S-curves (64) every repeated target nearly stops the rover"
     yield WantedParameter("GUID_OPTIONS", 0.0, INT32, why, rule=Rule.WITHOUT, bound=S_CURVES)
-    why = "seconds for which the last velocity goes on if the companion dies"
-    yield WantedParameter("GUID_TIMEOUT", 3.0, REAL32, why, rule=Rule.AT_MOST)
+    why = "seconds for which the last velocity goes on if the companion dies; with 1 planned motions are faster"
+    yield WantedParameter("GUID_TIMEOUT", 1.0, REAL32, why, rule=Rule.AT_MOST, bound=3.0)
     why = "metres: the companion aims far ahead, and a small radius keeps the rover on its line"
     yield WantedParameter("WP_RADIUS", recommended["WP_RADIUS"], REAL32, why, rule=Rule.AT_MOST, bound=2.0)
     why = "m/s³: with less the rover begins and ends its ways slowly; the companion was tried with 3"
