@@ -20,9 +20,13 @@ BELIEVED_M_S2, BELIEVED_RAD_S2 = 2.0, 4.0
 """No rover is taken to brake, gather speed or change its turn rate better than this because its autopilot would let
 it."""
 GUARDED_S = 1.0
-"""A velocity that lasts no longer is ended by a guard."""
+"""A velocity that lasts no longer is ended by a guard, or by a short timeout of the autopilot."""
+SOON_S = 0.5
+"""Of one that lasts no longer it hardly matters where it leads then: so long with a guard as it ships."""
+ALONE_SHARE, LONG_ALONE_S = 0.8, 2.0
+"""Beyond ``SOON_S`` this share counts as left alone; without a guard, with 3 s, that is ``LONG_ALONE_S``."""
 LONG_OFF = 0.1
-"""Without one a rover may turn by so much more off what is told: a small error of the turn rate grows for seconds."""
+"""Then a rover may turn by so much more off what is told: a small error of the turn rate grows for seconds."""
 
 
 class Following(NamedTuple):
@@ -41,9 +45,14 @@ class Following(NamedTuple):
     gains_most_m_s2: float = 1.3
 
 
+def alone_s(lasts_s: float) -> float:
+    """How long a rover counts as left alone with a velocity that lasts so long."""
+    return max(lasts_s - GUARDED_S, ALONE_SHARE * (lasts_s - SOON_S), 0.0)
+
+
 def turn_gains(follows: Following, lasts_s: float) -> tuple[float, ...]:
     """By which factors more than told a rover may turn, where a velocity lasts so long."""
-    off = follows.off_model + (LONG_OFF if lasts_s > GUARDED_S else 0.0)
+    off = follows.off_model + LONG_OFF * min(alone_s(lasts_s) / LONG_ALONE_S, 1.0)
     return 1.0 + off, 1.0 - off, 1.0
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.control.following import GUARDED_S, Following, turn_gains
+from companion.control.following import SOON_S, Following, turn_gains
 from companion.control.local_view import LocalView
 from companion.control.told import in_force
 from companion.mapping.evidence_map import EvidenceMap
@@ -174,12 +174,12 @@ def _worst(follows: Following) -> Rover:
 
 
 def _obeys_s(view: LocalView) -> tuple[float, ...]:
-    """When a command has its effect, in whole steps: at the latest, and over a late link or without a guard also at the
+    """When a command has its effect, in whole steps: at the latest, and over a late link, or if it lasts, also at the
     soonest. It lasts on from there, so later leads farther; but a turn that is under way may end sooner.
     """
     follows = view.following
     latest_s = math.ceil(follows.dead_s * (1.0 + follows.off_model) / STEP_S - 1e-6) * STEP_S
-    if view.soonest_s >= follows.dead_s and view.settings.guidance.velocity_lasts_s <= GUARDED_S:
+    if view.soonest_s >= follows.dead_s and view.settings.guidance.velocity_lasts_s <= SOON_S:
         return (latest_s,)
     soonest_s = min(view.soonest_s, follows.dead_s) * (1.0 - follows.off_model)
     return latest_s, math.floor(soonest_s / STEP_S + 1e-6) * STEP_S

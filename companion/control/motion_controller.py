@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from companion.control.blind_behind import backwards_m_s
 from companion.control.controller import ControlCommand, Purpose, stop_for
-from companion.control.following import GUARDED_S, Following, turn_gains
+from companion.control.following import GUARDED_S, SOON_S, Following, alone_s, turn_gains
 from companion.control.last_command_kernels import admitted_speeds, braking_spares_m, may_be_last
 from companion.control.local_view import LocalView
 from companion.control.motion_ground import NEAR_M, Window, look_round, unseen_to_m
@@ -199,7 +199,7 @@ class MotionController:
             return stop_for(Purpose.BLOCKED)
         found = self._planner.plan(problem, passed_s)
         told = self._against_roll(self._safe(found.motion[0], view, worst), view, worst)
-        self._standstill.told(told.speed_m_s, view, guarded=_alone_s(view) == 0.0)
+        self._standstill.told(told.speed_m_s, view, guarded=_is_guarded(view))
         assert self._window is not None
         ahead = self._position.faster_than(told.speed_m_s, path, view)
         self.choice = MotionChoice(now_s, problem, found, told, self._window.corner, self._outline, ahead)
@@ -247,7 +247,7 @@ class MotionController:
 
     def _is_to_stand(self, speed_m_s: float, view: LocalView) -> bool:
         """Whether it must have stood before it is told this."""
-        return self._standstill.is_needed_for(speed_m_s, view, guarded=_alone_s(view) == 0.0)
+        return self._standstill.is_needed_for(speed_m_s, view, guarded=_is_guarded(view))
 
     def _against_roll(self, told: ToldVelocity, view: LocalView, worst: Problems) -> ToldVelocity:
         """Against its roll, where it is to stand and rolls back."""
@@ -299,15 +299,15 @@ def _admitted(view: LocalView, worst: Problems) -> NDArray[np.float64]:
     return admitted
 
 
-def _alone_s(view: LocalView) -> float:
-    """How much longer a velocity lasts than with a guard."""
-    return max(view.settings.guidance.velocity_lasts_s - GUARDED_S, 0.0)
+def _is_guarded(view: LocalView) -> bool:
+    """Whether what is told ends as soon as with a guard."""
+    return view.settings.guidance.velocity_lasts_s <= GUARDED_S
 
 
 def _faster_s(view: LocalView) -> float:
     """Room for each m/s."""
-    alone_s, beam_rad = _alone_s(view), min(view.rover.beam_rad, MOST_BLUR_RAD)
-    return max(FASTER_S, (BLUR_S + LONGER_BLUR * alone_s) * beam_rad) + DRIFT_SHARE * alone_s
+    left_s, beam_rad = alone_s(view.settings.guidance.velocity_lasts_s), min(view.rover.beam_rad, MOST_BLUR_RAD)
+    return max(FASTER_S, (BLUR_S + LONGER_BLUR * left_s) * beam_rad) + DRIFT_SHARE * left_s
 
 
 def _braking_spares_m(turns_rad_s: NDArray[np.float64], view: LocalView, worst: Problems) -> NDArray[np.float64]:
@@ -328,13 +328,13 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: Problems) -> 
 
 
 def _sooner_or_later(later: MotionProblem, view: LocalView) -> Problems:
-    """The problem of a rover that obeys as late as may be; over a late link, and without a guard, also that of one that
-    obeys soon.
+    """The problem of a rover that obeys as late as may be; over a late link, and of a velocity that lasts, also that of
+    one that obeys soon.
 
     A turn that is under way leads elsewhere if it ends sooner: over a late link that is half a second of turning, and
     in the three seconds without a guard a few degrees become half a metre.
     """
-    if view.soonest_s >= view.following.dead_s and _alone_s(view) == 0.0:
+    if view.soonest_s >= view.following.dead_s and view.settings.guidance.velocity_lasts_s <= SOON_S:
         return (later,)
     return later, later._replace(pending=_pending(view, _soonest(view), ALONE_STEP_S))
 

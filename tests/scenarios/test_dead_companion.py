@@ -13,6 +13,7 @@ from companion.mission.mission import Mission
 from sitl.experiments import dead_companion
 from sitl.experiments.dead_companion import DeadReport, Death, die, overheard, run, with_suite
 from sitl.experiments.experiment import Options
+from sitl.experiments.off_model import scenario_off_model, taken_for
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 
@@ -33,6 +34,24 @@ def test_whenever_it_dies_nothing_is_touched(name: str, suite: str) -> None:
     assert [death for death in deaths if death.touched] == []
     assert max(death.went_s for death in deaths) < 30.0
     assert max(death.went_m for death in deaths) < 9.0
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("name", "seed", "timeout_s", "went_m"), [("rooms.toml", 10, 1.0, 6.0), ("complex.toml", 0, 10.0, 10.0)]
+)
+def test_with_another_timeout_of_the_autopilot_nothing_is_touched_either(
+    name: str, seed: int, timeout_s: float, went_m: float
+) -> None:
+    """As long as the autopilot says what is told lasts. Without that, walls were touched in both drives."""
+    mission = with_suite(load_mission(MISSIONS / name), "lidar-360")
+    scenario = scenario_off_model(mission, seed, 0.3, guarded=False, timeout_s=timeout_s)
+    told = overheard(mission, seed, taken_for("motion-ga", "test"), scenario)
+    deaths = die(told, np.linspace(told.begin_s + 2.0, told.end_s - 2.0, 20).tolist())
+    if timeout_s == 1.0:
+        deaths += die(told, [49.69])
+    assert [death for death in deaths if death.touched] == []
+    assert max(death.went_m for death in deaths) < went_m
 
 
 @pytest.mark.thorough

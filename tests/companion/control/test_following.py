@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from companion.control.following import AS_SHIPPED, following_of, within_limits
+from companion.control.following import AS_SHIPPED, alone_s, following_of, turn_gains, within_limits
 from companion.core.rover_limits import RoverLimits
 from companion.settings import MotionSettings
 
@@ -53,3 +53,14 @@ def test_what_the_autopilot_would_cut_short_is_a_limit() -> None:
 def test_limits_that_are_not_known_or_zero_change_nothing() -> None:
     zero = {"WP_SPEED": 0.0, "CRUISE_SPEED": 0.0, "ATC_STR_RAT_MAX": 0.0}
     assert within_limits(ROVER, {}) == within_limits(ROVER, zero) == ROVER
+
+
+def test_the_longer_a_velocity_lasts_the_more_the_rover_is_left_alone() -> None:
+    """With a guard as it ships not at all; so that no limit lies between a guard of 0.9 s and a timeout of 1 s."""
+    lasts_s = [0.1, 0.35, 0.5, 0.9, 1.0, 1.2, 3.0, 10.0]
+    left_s = [alone_s(one) for one in lasts_s]
+    assert left_s == sorted(left_s) and left_s[:3] == [0.0] * 3 and left_s[3] > 0.0
+    assert left_s[-2:] == [2.0, 9.0]
+    most = [max(turn_gains(AS_SHIPPED, one)) for one in lasts_s]
+    assert most == sorted(most) and most[0] == 1.0 + AS_SHIPPED.off_model
+    assert most[-2:] == pytest.approx([1.4 + AS_SHIPPED.off_model - 0.3] * 2)
