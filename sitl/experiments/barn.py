@@ -298,7 +298,7 @@ class BarnReport(ExperimentReport):
         shown = min(WORST, len(self.series[self._best()]))
         tables = "\n\n".join(f"{_told(one)}:\n\n{markdown_table(HEAD, self._rows(one))}" for one in self._setups())
         others = " and ".join(self._others())
-        return f"""## Narrow ground (BARN){others and f": {others}"}
+        return f"""## Narrow ground (BARN){others and f": {others}"}{self.options.timeout_title}
 
 `{self.options.command(NAME)}`
 

@@ -231,8 +231,9 @@ class DeadReport(ExperimentReport):
         """See ``ExperimentReport``."""
         tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in self._suites())
         touched, run_into = sum(d.touched for d in self.deaths), sum(d.run_into for d in self.deaths)
+        while_it = " while it plans motions" if self._planned else ""
         with_guard = ", with the guard" if self.options.guard else ""
-        return f"""## A companion that falls dead{" while it plans motions" if self._planned else ""}{with_guard}
+        return f"""## A companion that falls dead{while_it}{with_guard}{self.options.timeout_title}
 
 `{self.options.command(NAME)}`
 

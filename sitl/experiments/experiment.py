@@ -117,6 +117,11 @@ class Options:
         return "" if self.timeout_s == TIMEOUT_S else "-guid-timeout"
 
     @property
+    def timeout_title(self) -> str:
+        """Of the title of a section, where the timeout is another one than usual."""
+        return "" if self.timeout_s == TIMEOUT_S else f", a timeout of {self.timeout_s:g} s"
+
+    @property
     def mismatch(self) -> str:
         """What is not as the companion expects it, in words."""
         late = f", and each message takes {self.late_s:g} s over the link, each way" if self.late_s else ""

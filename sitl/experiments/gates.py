@@ -157,7 +157,7 @@ class GatesReport(ExperimentReport):
         size = f"{outline.front_m + outline.rear_m:g} x {2.0 * outline.half_width_m:g} m"
         guarded = _is_guarded(self.options)
         head = ("" if guarded else f", {STRICT}") + ("" if self.options.outline_m is None else f": a rover of {size}")
-        return f"""## Gates{head}
+        return f"""## Gates{head}{self.options.timeout_title}
 
 `{self.options.command(NAME)}`
 

@@ -120,7 +120,7 @@ class MissionsReport(ExperimentReport):
         guard = ", with the guard on the autopilot" if self.options.guard else ""
         first, after = self.options.seed, self.options.seed + self.options.runs
         later = f", seeds {first} to {after - 1}" if first else ""
-        return f"""## Every shipped mission{guard}{later}
+        return f"""## Every shipped mission{guard}{later}{self.options.timeout_title}
 
 `{self.options.command(NAME)}`
 
