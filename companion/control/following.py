@@ -80,6 +80,12 @@ def following_of(settings: MotionSettings, parameters: Mapping[str, float]) -> F
     return Following(settings.dead_s, gains, brakes, turns, settings.turn_gain, off, most_m_s2 * (1.0 + off))
 
 
+def turns_are_limited(settings: MotionSettings, parameters: Mapping[str, float]) -> bool:
+    """Whether the change of the turn rate is known to have a limit: a set one, or one that the autopilot tells."""
+    told_rad_s2 = math.radians(parameters.get(TURN_ACCELERATION, 0.0))
+    return settings.turn_acceleration_rad_s2 is not None or 0.0 < told_rad_s2 <= BELIEVED_RAD_S2
+
+
 def within_limits(rover: RoverLimits, parameters: Mapping[str, float]) -> RoverLimits:
     """The same rover, no faster than the autopilot lets it drive and turn where it is told velocities.
 

@@ -44,8 +44,8 @@ the first. Told one way and the other several times a second, nearly any figure 
 LEAST_SHARE, MOST_SHARE = 0.5, 2.0
 """No figure leaves these bounds, of what it began with."""
 LIMITED = "turn_acceleration_rad_s2"
-"""The autopilot itself changes the turn rate no faster than its limit: more than the doubt in that is never believed,
-or a rover that turns a little late would be taken for one that turns fast."""
+"""Where the autopilot has a limit of it, it changes the turn rate no faster: more than the doubt in that is never
+believed, or a rover that turns a little late would be taken for one that turns fast."""
 ERROR_M_S, ERROR_RAD_S = 0.1, 0.15
 """Differences that are usual."""
 MOST_ERROR = 3.0
@@ -117,9 +117,14 @@ class ModelEstimator:
         self._earlier: ModelEstimate | None = None
         self._rows: deque[tuple[float, float, float, float, float]] = deque()
         self._fitted_s = -math.inf
+        self._limited = False
 
-    def assume(self, began: Following) -> None:
-        """What is assumed at first, as far as is known now; if it is another than before, the estimate begins anew."""
+    def assume(self, began: Following, *, limited: bool) -> None:
+        """What is assumed at first, as far as is known now; if it is another than before, the estimate begins anew.
+
+        ``limited``: whether the change of the turn rate is a limit of the autopilot's.
+        """
+        self._limited = limited
         if began != self.estimate.began:
             earlier = self._earlier
             self.estimate = earlier if earlier and earlier.began == began else ModelEstimate(began, began)
@@ -143,12 +148,15 @@ class ModelEstimator:
             rows.popleft()
         if now_s - self._fitted_s >= EVERY_S and now_s - rows[0][0] >= LEAST_S:
             self._fitted_s = now_s
-            self.estimate = _fitted(self.estimate, np.array(rows))
+            self.estimate = _fitted(self.estimate, np.array(rows), limited=self._limited)
 
 
-def _fitted(before: ModelEstimate, rows: NDArray[np.float64]) -> ModelEstimate:
+def _fitted(before: ModelEstimate, rows: NDArray[np.float64], *, limited: bool) -> ModelEstimate:
     """The estimate after one more look at the last seconds."""
     began, best = before.began, before.figures
+    if limited:
+        most_rad_s2 = (1.0 + began.off_model) * began.turn_acceleration_rad_s2
+        best = best._replace(turn_acceleration_rad_s2=min(best.turn_acceleration_rad_s2, most_rad_s2))
     least = _error(best, began, rows)
     for dead_s in DEADS_S:
         if not LEAST_SHARE * began.dead_s <= dead_s <= MOST_SHARE * began.dead_s:
@@ -163,7 +171,7 @@ def _fitted(before: ModelEstimate, rows: NDArray[np.float64]) -> ModelEstimate:
             continue
         usual = getattr(began, name)
         for change in CHANGES:
-            most = 1.0 + began.off_model if name == LIMITED else MOST_SHARE
+            most = 1.0 + began.off_model if limited and name == LIMITED else MOST_SHARE
             value = min(max(getattr(best, name) * (1.0 + change), LEAST_SHARE * usual), most * usual)
             tried = best._replace(**{name: value})
             if (error := _error(tried, began, rows)) < least:

@@ -15,7 +15,7 @@ import numpy as np
 
 from companion.control.braking import counted_s, for_link, for_silence, late, soonest_s
 from companion.control.controller import ControlCommand, Controller
-from companion.control.following import following_of, within_limits
+from companion.control.following import following_of, turns_are_limited, within_limits
 from companion.control.local_view import LocalView
 from companion.control.model_estimate import ModelEstimator
 from companion.core.frames import GeoPoint, NedPoint, Pose
@@ -253,6 +253,11 @@ class MissionExecutor:
         self.trail, self._refuges = Trail(), self._refuges[-1:]
         self.odometer.forget_place()
         return True
+
+    @property
+    def scans_mapped(self) -> int:
+        """How many scans were taken into the map since the mission began."""
+        return self._scans
 
     def forget_map(self, now_s: float) -> None:
         """What has been seen lies elsewhere now."""
@@ -510,7 +515,8 @@ class MissionExecutor:
         rate_rad_s = 0.0 if vehicle.attitude is None else vehicle.attitude.yaw_rate_rad_s
         back = vehicle.forward_m_s < -ROLLS_BACK_M_S
         motion = settings.motion
-        self.estimator.assume(following_of(motion, vehicle.parameters))
+        limited = turns_are_limited(motion, vehicle.parameters)
+        self.estimator.assume(following_of(motion, vehicle.parameters), limited=limited)
         found = self.estimator.estimate.following(motion.off_model_known)
         follows = late(found, motion.dead_s, vehicle.latency_s)
         rover = self._limits if self.controller == "points" else within_limits(self._limits, vehicle.parameters)

@@ -14,6 +14,7 @@ import numpy as np
 
 from companion.control.controller import STANDSTILL, ControlCommand
 from companion.control.drag import DragWatch, braked_harder
+from companion.control.following import GUARDED_S
 from companion.control.setpoint_check import SetpointCheck
 from companion.control.told import Told, after
 from companion.core.changed import changed
@@ -150,6 +151,11 @@ class MissionRun:
         return self._told
 
     @property
+    def _lasts_s(self) -> float:
+        """How long the autopilot goes on with a velocity or a turn."""
+        return velocity_lasts_s(self.vehicle.parameters, self._settings.current.guidance.velocity_lasts_s)
+
+    @property
     def stopped(self) -> bool:
         """Whether the rover was not to be driven in the last tick."""
         return self.stop is not None
@@ -171,8 +177,9 @@ class MissionRun:
         assert seen is not None
         self.executor = self._make_executor(layout, progress, seen.scan)
         if self.executor.controller != "points" and self.vehicle.guard_at(now_s) is None:
-            lasts_s = velocity_lasts_s(self.vehicle.parameters, self._settings.current.guidance.velocity_lasts_s)
-            text = f"No guard on the autopilot: each command must be safe for {lasts_s:g} s, so the rover is slower"
+            text = f"No guard on the autopilot: each command must be safe for {self._lasts_s:g} s"
+            if self._lasts_s > GUARDED_S:
+                text += ", so the rover is slower"
             self._notifier.tell(text, Severity.INFO)
         return self.executor
 
@@ -233,7 +240,7 @@ class MissionRun:
         self._lately = after(self._lately, setpoint, now_s)
         if isinstance(setpoint, GuidedPosition):
             self._placed_s = now_s
-        self.sender.speak(command, now_s)
+        self.sender.speak(command, now_s, self._lasts_s)
 
 
 def new_run(

@@ -17,6 +17,8 @@ from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import ChangeSpeed, Command, GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
 
 VELOCITY_PERIOD_S = 0.2
+AGAIN_SHARE = 1.0 / 3.0
+"""Headings and velocities are said again after this share of the time that they last: two may be lost."""
 SPEED_PERIOD_S = 0.5
 MOVED_M = 0.1
 """A position that has moved less is still the same."""
@@ -37,11 +39,20 @@ class SentSetpoints:
         self._speed_s = -math.inf
 
     def due(
-        self, wanted: ControlCommand, now_s: float, settings: GuidanceSettings, *, confirmed: bool | None
+        self,
+        wanted: ControlCommand,
+        now_s: float,
+        settings: GuidanceSettings,
+        lasts_s: float,
+        *,
+        confirmed: bool | None,
     ) -> list[Command]:
-        """The commands to send now. ``confirmed`` False: the autopilot follows something else, so say it again."""
+        """The commands to send now. ``confirmed`` False: the autopilot follows something else, so say it again.
+
+        ``lasts_s``: the autopilot ends a heading or a velocity that is not said again.
+        """
         commands: list[Command] = []
-        if self._is_due(wanted.setpoint, now_s, settings, confirmed=confirmed):
+        if self._is_due(wanted.setpoint, now_s, settings, lasts_s, confirmed=confirmed):
             commands.append(wanted.setpoint)
             self._setpoint, self._setpoint_s = wanted.setpoint, now_s
         if isinstance(wanted.setpoint, GuidedPosition) and self._speed_is_due(wanted.speed_m_s, now_s):
@@ -49,8 +60,10 @@ class SentSetpoints:
             self._speed_m_s, self._speed_s = wanted.speed_m_s, now_s
         return commands
 
-    def _is_due(self, setpoint: Setpoint, now_s: float, settings: GuidanceSettings, *, confirmed: bool | None) -> bool:
-        since_s = now_s - self._setpoint_s
+    def _is_due(
+        self, setpoint: Setpoint, now_s: float, settings: GuidanceSettings, lasts_s: float, *, confirmed: bool | None
+    ) -> bool:
+        since_s, again_s = now_s - self._setpoint_s, AGAIN_SHARE * lasts_s
         match setpoint, self._setpoint:
             case GuidedPosition(), GuidedPosition() as last:
                 moved_m = setpoint.point.distance_m(last.point)
@@ -58,9 +71,9 @@ class SentSetpoints:
                 return since_s >= limit_s or (moved_m > MOVED_M and since_s >= settings.change_after_s)
             case GuidedHeading(), GuidedHeading() as last:
                 turned = abs(wrap_pi_rad(setpoint.heading_rad - last.heading_rad))
-                return since_s >= settings.resend_s or (turned > math.radians(5.0) and since_s >= 0.2)
+                return since_s >= min(settings.resend_s, again_s) or (turned > math.radians(5.0) and since_s >= 0.2)
             case GuidedVelocity(), GuidedVelocity() as last:
-                return since_s >= VELOCITY_PERIOD_S or setpoint != last
+                return since_s >= min(VELOCITY_PERIOD_S, again_s) or setpoint != last
             case _:
                 return True
 
@@ -83,11 +96,14 @@ class SetpointSender:
         """Forget what was sent: the next setpoint goes out at once."""
         self._sent.reset()
 
-    def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:
-        """Of a control command the setpoint and its speed, if they are new or due again; any other command as it is."""
+    def speak(self, command: ControlCommand | Command | None, now_s: float, lasts_s: float) -> None:
+        """Of a control command the setpoint and its speed, if they are new or due again; any other command as it is.
+
+        ``lasts_s``: see ``SentSetpoints.due``.
+        """
         if isinstance(command, ControlCommand):
             settings, confirmed = self._settings.current.guidance, self._autopilot.target_confirmed
-            for one in self._sent.due(command, now_s, settings, confirmed=confirmed):
+            for one in self._sent.due(command, now_s, settings, lasts_s, confirmed=confirmed):
                 self.send(one, now_s)
         elif command is not None:
             self.send(command, now_s)

@@ -41,6 +41,7 @@ class Doubt(Enum):
     LIDAR_BLIND = "{} has seen nothing for over {:g} s (on open ground: empty=5)"
     LIDAR_LATE = "{} later than {:g} s"
     OTHER_COMPANION = "another companion drives this rover"
+    TIMEOUT_LONG = "GUID_TIMEOUT is {:g} s: a velocity would go on for too long (set 1 to 3)"
     FENCE_BREACHED = "the autopilot's fence is breached"
     BEYOND_BORDER = "the rover is beyond the border of {}"
     WAITED_TOO_LONG = "waited too long for {}"

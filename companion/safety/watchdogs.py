@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import Protocol
 
 from companion.perception.scan_filter import ScanWatch
-from companion.safety.reasons import Doubt, Reason
+from companion.safety.reasons import WAITED_OUT, Doubt, Reason
 from companion.settings import SafetySettings
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events import (
@@ -68,11 +68,17 @@ class Worker(Protocol):
 
 
 def first_doubt(monitors: Iterable[Monitor], now_s: float) -> Reason[Doubt] | None:
-    """The doubt of the first monitor that has one: their order is the order of precedence."""
+    """The doubt of the first monitor that has one: their order is the order of precedence.
+
+    One that is waited out comes after all others: it must not keep HOLD from the rover for their sake.
+    """
+    waited: Reason[Doubt] | None = None
     for monitor in monitors:
-        if (doubt := monitor.doubt(now_s)) is not None:
+        doubt = monitor.doubt(now_s)
+        if doubt is not None and doubt.kind not in WAITED_OUT:
             return doubt
-    return None
+        waited = waited or doubt
+    return waited
 
 
 class SticksMonitor(Monitor):

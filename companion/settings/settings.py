@@ -236,18 +236,9 @@ class MotionSettings(Section):
     turn_gain: float = Field(1.0, gt=0.0, le=3.0, description="the turn rate that shows, as a multiple of that told")
     learns: bool = Field(True, description="whether all of these are estimated from what the rover does")
     off_model: float = Field(0.3, ge=0.0, le=0.9, description="the rover may differ from these by so large a share ...")
-    off_model_known: float = Field(0.1, ge=0.0, le=0.9, description="... and by this one once they are known")
+    off_model_known: float = Field(0.1, ge=0.0, le=0.9, description="... and by this one, if less, once they are known")
     turn_rad_s: float = Field(1.5, gt=0.0, le=10.0, description="the fastest turn that is told")
     backwards_m_s: float = Field(0.5, ge=0.0, le=10.0, description="the fastest speed backwards that is told")
-
-    @model_validator(mode="after")
-    def _surer_once_known(self) -> Self:
-        if self.off_model_known > self.off_model and "off_model_known" in self.model_fields_set:
-            raise ValueError(
-                f"off_model_known {self.off_model_known:g} lies above off_model {self.off_model:g}; "
-                "a rover that is known differs less, not more"
-            )
-        return self
 
 
 class SteeringSettings(Section):

@@ -17,6 +17,7 @@ from companion.safety.fix_jump import FixJump, JumpPhase
 from companion.safety.reasons import Doubt, Reason
 from companion.safety.watchdogs import Monitor
 from companion.settings.live_settings import LiveSettings
+from companion.vehicle.dead_reckoning import MAX_DRIFT_M, Drift
 from companion.vehicle.events import (
     Event,
     GpsSeen,
@@ -39,6 +40,8 @@ WANDERINGS, WANDERINGS_S = 3, 20.0
 """If the position wanders this often within this time, the rover must not drive."""
 ONCE_S = 3.0
 """Wandering that goes on within this time of the last is counted once."""
+ANSWERED_S = 2.0
+"""While it settles, the origin must be heard this often: without it the map could not begin anew."""
 CALM_S = 10.0
 """How long after the last wandering the rover must not drive; after steps with the fix it stands so long."""
 
@@ -62,8 +65,12 @@ class LocalizationMonitor(Monitor):
         self._wandered_s: deque[float] = deque(maxlen=WANDERINGS)
         self._stepped_s: deque[float] = deque(maxlen=WANDERINGS)
         self._unsure_until_s = self._steps_until_s = -math.inf
-        self._forgot_s: float | None = None
-        """When the map was forgotten; None once something ahead is on it again."""
+        self._answered_s = -math.inf
+        """When the origin was heard last."""
+        self._began_s: float | None = None
+        """When a drift was noticed that may be a step of the GPS fix, of which the receiver has not told yet."""
+        self._forgot: tuple[float, int] | None = None
+        """When the map was forgotten, and how many scans there had been; None once one ahead is on it again."""
         self._fix = FixJump()
 
     @property
@@ -77,8 +84,10 @@ class LocalizationMonitor(Monitor):
             return Reason(Doubt.POSITION_WANDERS)
         if self._doubt is None and now_s < self._steps_until_s:
             return Reason(Doubt.FIX_CHANGED)
-        if self._doubt is None and self._forgot_s is not None:
+        if self._doubt is None and self._forgot is not None:
             return Reason(Doubt.MAP_EMPTY)
+        if self._doubt is Doubt.POSITION_SETTLES and now_s - self._answered_s > ANSWERED_S:
+            return Reason(Doubt.POSITION_WANDERED)
         return None if self._doubt is None else Reason(self._doubt)
 
     def tick(self, now_s: float) -> None:
@@ -99,18 +108,19 @@ class LocalizationMonitor(Monitor):
             self._fix.take_report(event)
         if (executor := self._run.executor) is None:
             return
-        if self._forgot_s is not None and vehicle.scan_ahead is not None and vehicle.scan_ahead.time_s > self._forgot_s:
-            self._forgot_s = None
+        if self._forgot is not None and vehicle.scan_ahead is not None:
+            forgot_s, scans = self._forgot
+            if vehicle.scan_ahead.time_s > forgot_s and executor.scans_mapped > scans:
+                self._forgot = None
         match event:
             case LocalPositionSeen() if vehicle.jump_m > self._settings.current.safety.jump_m:
                 self._begin(Doubt.POSITION_JUMPED, event.time_s, f"Position jumped {vehicle.jump_m:.1f} m")
             case LocalPositionSeen() if self._doubt is Doubt.FIX_CHANGED and not self._fix.watching:
                 self._begin(Doubt.POSITION_WANDERED, event.time_s, "Positions were missing after a change of GPS fix")
-            case LocalPositionSeen() if self._fix.watching and self._doubt in (None, Doubt.FIX_CHANGED):
+            case LocalPositionSeen() if self._fix.watching and self._may_be_fix:
                 self._follow_fix(event.time_s, executor)
             case LocalPositionSeen() if vehicle.wander.noticed:
-                self._begin(Doubt.POSITION_WANDERED, event.time_s, f"Position wandered {vehicle.wander.off_m:.1f} m")
-                self._count_wandering(event.time_s)
+                self._wander(vehicle.wander, event.time_s)
             case OriginSeen():
                 self._find_ground(event, executor, settled=vehicle.wander.settled)
             case HomeSeen() if not self._home_told and apart_m(event.point, executor.layout.home) > HOME_MOVED_M:
@@ -119,10 +129,26 @@ class LocalizationMonitor(Monitor):
             case _:
                 pass
 
+    @property
+    def _may_be_fix(self) -> bool:
+        """Whether a step of the position may be one of the fix: the receiver may tell of that later."""
+        return self._doubt in (None, Doubt.FIX_CHANGED) or self._began_s is not None
+
+    def _wander(self, drift: Drift, now_s: float) -> None:
+        """A drift was noticed. A quick one may be a step of the fix: what is to be done is known a second later."""
+        if drift.off_m > MAX_DRIFT_M:
+            self._begin(Doubt.POSITION_WANDERED, now_s, f"Position wandered {drift.off_m:.1f} m")
+        elif self._doubt in (None, Doubt.FIX_CHANGED):
+            self._notifier.tell(f"Position wandered {drift.quick_m:.1f} m within a second", Severity.WARNING)
+            self._doubt, self._doubt_s, self._began_s = Doubt.POSITION_WANDERED, now_s, now_s
+        else:
+            self._doubt, self._doubt_s = Doubt.POSITION_WANDERED, now_s
+        self._count_wandering(now_s)
+
     def _begin(self, doubt: Doubt, now_s: float, text: str) -> None:
         if self._doubt in (None, Doubt.FIX_CHANGED):
             self._notifier.tell(f"{text}: map forgotten", Severity.WARNING)
-        self._doubt, self._doubt_s = doubt, now_s
+        self._doubt, self._doubt_s, self._began_s = doubt, now_s, None
 
     def _follow_fix(self, now_s: float, executor: MissionExecutor) -> None:
         """The rover stands while the position steps with the fix; then the map is moved. In doubt it is forgotten."""
@@ -132,11 +158,13 @@ class LocalizationMonitor(Monitor):
             self._count_wandering(now_s)
         elif fix.phase is JumpPhase.STEPPING:
             self._doubt, self._doubt_s = Doubt.FIX_CHANGED, now_s
+            self._uncount_wandering()
         elif fix.phase is JumpPhase.SETTLED:
             self._count_step(now_s)
             change = f"{fix.before.text} to {fix.after.text}" if fix.before != fix.after else f"{fix.after.text} again"
             self._notifier.tell(f"GPS {change}: the map is moved by {fix.off_m:.2f} m", Severity.WARNING)
             executor.move_map(fix.north_m, fix.east_m, now_s)
+            self._uncount_wandering()
             self._doubt = None
             self._run.start_afresh()
 
@@ -153,12 +181,19 @@ class LocalizationMonitor(Monitor):
         if len(self._wandered_s) == WANDERINGS and now_s - self._wandered_s[0] <= WANDERINGS_S:
             self._unsure_until_s = now_s + CALM_S
 
+    def _uncount_wandering(self) -> None:
+        """What was taken for a drift is a step of the fix."""
+        while self._began_s is not None and self._wandered_s and self._wandered_s[-1] >= self._began_s:
+            self._wandered_s.pop()
+        self._began_s = None
+
     @property
     def _wandered(self) -> bool:
         return self._doubt in (Doubt.POSITION_WANDERED, Doubt.POSITION_SETTLES)
 
     def _find_ground(self, event: OriginSeen, executor: MissionExecutor, *, settled: bool) -> None:
         """The origin as it is now: after a jump it tells whether the frame has moved, or only the rover in it."""
+        self._answered_s = event.time_s
         if executor.follow_origin(event.point, event.time_s):
             self._doubt, self._doubt_s = Doubt.ORIGIN_MOVED, event.time_s
         elif self._doubt in (None, Doubt.FIX_CHANGED) or event.time_s - self._doubt_s < SETTLED_S:
@@ -167,6 +202,9 @@ class LocalizationMonitor(Monitor):
             self._doubt = Doubt.POSITION_SETTLES
         else:
             self._fix.begin_anew()
+            if self._began_s is not None:
+                self._notifier.tell("The position has settled: map forgotten", Severity.WARNING)
             executor.forget_map(event.time_s)
-            self._doubt, self._forgot_s = None, event.time_s
+            self._forgot = event.time_s, executor.scans_mapped
+            self._doubt = self._began_s = None
             self._run.start_afresh()

@@ -1,6 +1,7 @@
 -- Guard for rover-companion: HOLD when the companion falls silent while it drives the rover.
 --
--- A velocity lasts three seconds in ArduRover. Without this script a rover whose companion dies drives on for as long.
+-- A velocity lasts three seconds in ArduRover, or GUID_TIMEOUT. Without this script a rover whose companion dies drives
+-- on for as long.
 -- It waits SCR_USER1 milliseconds (200 to 3000; 0: 300). It begins to watch with the companion's first setpoint in
 -- GUIDED, and ends when the mode is another one or the rover is disarmed: so it never acts against a pilot, nor on a
 -- companion that ended well. Twice a second it tells as CMPGRD191, the number being the component it watches, how long
@@ -39,7 +40,7 @@ local function listen(now_ms, guided)
     if not message then return end
     local system, component, id = string.unpack("<BBI3", message, 8)
     if component == COMPANION and system == own then
-      heard_ms = now_ms
+      heard_ms, switch_us = now_ms, mode_switch_us()
       if guided and SETPOINTS[id] then watches = true end
     elseif asks_for_mode(message, id) then
       acted = false
@@ -55,7 +56,7 @@ local function update()
   listen(now_ms, guided)
   if watches and now_ms - heard_ms > waits_ms() then
     if vehicle:get_mode() == GUIDED and vehicle:set_mode(HOLD) then -- else again, 20 ms later
-      watches, acted, switch_us = false, true, mode_switch_us()
+      watches, acted = false, true
       gcs:send_text(4, "Guard: companion silent, HOLD")
     end
   end

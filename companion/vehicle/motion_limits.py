@@ -15,9 +15,9 @@ CHANGES = (ACCELERATION, DECELERATION, TURN_ACCELERATION)
 LIMITS = (*CHANGES, FASTEST, CRUISE, TURN_RATE)
 THROTTLE_SCALE = (CRUISE, CRUISE_THROTTLE)
 """What tells how fast the rover drives with which throttle."""
-TIMEOUT, LEAST_TIMEOUT_S = "GUID_TIMEOUT", 0.1
-"""Seconds for which the last velocity goes on; less than the second counts as that. Older firmware has no such
-parameter: there it is always 3 s."""
+TIMEOUT, LEAST_TIMEOUT_S, MOST_TIMEOUT_S = "GUID_TIMEOUT", 0.1, 30.0
+"""Seconds for which the last velocity goes on; less than the second counts as that, with more than the third no ways
+are planned. Older firmware has no such parameter: there it is always 3 s."""
 CRUISE_M_S, CRUISE_PERCENT = 2.0, 50.0
 """Both as ArduRover is shipped."""
 
@@ -36,4 +36,4 @@ def full_throttle_m_s(parameters: Mapping[str, float]) -> float:
 def velocity_lasts_s(parameters: Mapping[str, float], otherwise_s: float) -> float:
     """How long the last velocity goes on: as the autopilot tells, or ``otherwise_s`` where it does not."""
     told_s = parameters.get(TIMEOUT, math.nan)
-    return max(told_s, LEAST_TIMEOUT_S) if math.isfinite(told_s) else otherwise_s
+    return otherwise_s if math.isnan(told_s) else min(max(told_s, LEAST_TIMEOUT_S), MOST_TIMEOUT_S)

@@ -38,9 +38,9 @@ if TYPE_CHECKING:
 POINTS: ControllerKind = "points"
 GUARD = {"SCR_ENABLE": 1.0, "SCR_USER1": 300.0}
 """The guard on the autopilot puts HOLD so many milliseconds after the companion's last packet."""
-OFF_MODEL = 0.3
 TIMEOUT_S = 3.0
 """GUID_TIMEOUT as ArduRover is shipped; older firmware has it fixed."""
+OFF_MODEL = 0.3
 """So far a rover is off what the companion takes it for, at most, unless it is said."""
 START, TARGET = Cell(0, 24), Cell(98, 24)
 """Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""
@@ -114,7 +114,7 @@ class Options:
     @property
     def timeout_suffix(self) -> str:
         """Of the name of a section, where the timeout is another one than usual."""
-        return "" if self.timeout_s == TIMEOUT_S else "-guid-timeout"
+        return "" if self.timeout_s == TIMEOUT_S else f"-guid-timeout-{self.timeout_s:g}"
 
     @property
     def timeout_title(self) -> str:

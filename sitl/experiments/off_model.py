@@ -84,7 +84,7 @@ def scenario_off_model(
 ) -> Scenario:
     """What the mission is driven in: a rover off its model by up to this share, if it turns on the spot.
 
-    ``guarded``: with the guard on the autopilot, which ends a velocity after ``timeout_s``.
+    ``guarded``: with the guard on the autopilot. That ends a velocity itself after ``timeout_s``.
     """
     scenario = scenario_from_mission(mission)
     if off and mission.rover.turning_radius_m <= 0.0:

@@ -201,6 +201,17 @@ def test_a_hold_that_a_person_asks_for_as_well_is_not_its_doing_any_more(guard: 
     assert guard.mode == Mode.HOLD and guard.told_ms == 300.0
 
 
+def test_nor_is_one_just_before_which_a_pilot_moved_the_mode_switch() -> None:
+    """The autopilot takes a switch that has stayed for 0.2 s: then the guard has put HOLD already."""
+    there = Script()
+    there.put(Mode.GUIDED, True)
+    looks(there, 0.5, 0.1, packed(SETPOINT))
+    looks(there, 0.14)
+    there.lua.execute(b"switch_us = 1900")
+    looks(there, 1.5)
+    assert there.mode == Mode.HOLD and there.told_ms == 300.0
+
+
 def test_nor_is_one_in_which_a_pilot_moved_the_mode_switch() -> None:
     there = Script()
     there.put(Mode.GUIDED, True)

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from companion.control import model_estimate
-from companion.control.following import AS_SHIPPED, Following, following_of
+from companion.control.following import AS_SHIPPED, Following, following_of, turns_are_limited
 from companion.control.local_view import LocalView
 from companion.control.model_estimate import GAP_S, KNOWN_S, ModelEstimate, ModelEstimator, described
 from companion.control.told import Told, after
@@ -26,9 +26,12 @@ TICK_S = 0.05
 EVIDENCE, SETTINGS, LIMITS = ground(), Settings(), RoverLimits(0.4, 2.0, 8.0)
 
 
-def watched(rover: Following, seconds: float, seed: int = 0, noise: float = 0.02, told: bool = True) -> ModelEstimator:
+def watched(
+    rover: Following, seconds: float, seed: int = 0, noise: float = 0.02, told: bool = True, limited: bool = False
+) -> ModelEstimator:
     """What is found of a rover that is told other speeds and turn rates every half second."""
     estimator, rng = ModelEstimator(AS_SHIPPED), np.random.default_rng(seed)
+    estimator.assume(AS_SHIPPED, limited=limited)
     lately, history, speed, turn = Told(), [GuidedVelocity(0.0, 0.0)] * 40, 0.0, 0.0
     setpoint = history[0]
     for tick in range(round(seconds / TICK_S)):
@@ -144,9 +147,9 @@ def test_what_an_earlier_run_found_counts_once_the_same_is_assumed() -> None:
     estimator = ModelEstimator(AS_SHIPPED)
     estimator.go_on(earlier)
     assert estimator.estimate.known == 0.0
-    estimator.assume(began)
+    estimator.assume(began, limited=False)
     assert estimator.estimate == earlier
-    estimator.assume(AS_SHIPPED)
+    estimator.assume(AS_SHIPPED, limited=False)
     assert estimator.estimate == ModelEstimate(AS_SHIPPED, AS_SHIPPED)
 
 
@@ -187,13 +190,17 @@ def test_turning_to_and_fro_tells_nothing_of_how_much_a_rover_turns(seed: int) -
 
 
 def test_no_turn_rate_is_believed_to_change_faster_than_the_autopilot_may_let_it() -> None:
-    """It slews the rate itself; a rover that only obeys sooner fits a faster change as well."""
-    found = [
-        watched(AS_SHIPPED._replace(turn_acceleration_rad_s2=turns), 30.0).estimate.figures for turns in (1.5, 6.0)
-    ]
+    """It slews the rate itself; a rover that only obeys sooner fits a faster change as well. Without a limit it may."""
+    rovers = [AS_SHIPPED._replace(turn_acceleration_rad_s2=turns) for turns in (1.5, 6.0)]
+    found = [watched(rover, 30.0, limited=True).estimate.figures for rover in rovers]
     most = AS_SHIPPED.turn_acceleration_rad_s2 * (1.0 + AS_SHIPPED.off_model)
     assert found[0].turn_acceleration_rad_s2 == pytest.approx(1.5, rel=0.2)
     assert found[1].turn_acceleration_rad_s2 == pytest.approx(most)
+    assert watched(rovers[1], 30.0).estimate.figures.turn_acceleration_rad_s2 > 1.4 * most
+    assert turns_are_limited(MotionSettings(), {"ATC_STR_ACC_MAX": 120.0})
+    assert not any(turns_are_limited(MotionSettings(), {"ATC_STR_ACC_MAX": one}) for one in (0.0, 400.0))
+    assert not turns_are_limited(MotionSettings(), {})
+    assert turns_are_limited(MotionSettings(turn_acceleration_rad_s2=9.0), {})
 
 
 @pytest.mark.thorough

@@ -79,7 +79,7 @@ def test_the_lower_of_planned_speed_and_guidances_limit_reaches_the_autopilot(
     driver.decide(at(0.0))
     command = driver.guide(at(0.0))
     assert command.purpose is Purpose.DRIVE
-    commands = SentSetpoints().due(command, 0.0, SETTINGS.guidance, confirmed=None)
+    commands = SentSetpoints().due(command, 0.0, SETTINGS.guidance, 3.0, confirmed=None)
     assert ChangeSpeed(pytest.approx(told_m_s)) in commands
 
 

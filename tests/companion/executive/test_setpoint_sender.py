@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from companion.control.controller import STOP, ControlCommand, Purpose
@@ -36,7 +37,9 @@ def times_sent(guides, confirmed: bool | None = True, kind: type = GuidedPositio
     """When setpoints of a kind went out; ``guides``: time and guide, tick by tick."""
     sent = SentSetpoints()
     return [
-        t for t, guide in guides if any(isinstance(c, kind) for c in sent.due(guide, t, SETTINGS, confirmed=confirmed))
+        t
+        for t, guide in guides
+        if any(isinstance(c, kind) for c in sent.due(guide, t, SETTINGS, 3.0, confirmed=confirmed))
     ]
 
 
@@ -71,18 +74,18 @@ def test_stopping_goes_out_at_once_and_is_kept_alive():
     times_s = times_sent([(t, ControlCommand(Purpose.BRAKE, STOP, 0.0)) for t in ticks(2.0)], kind=GuidedVelocity)
     assert times_s[0] == 0.0 and max(b - a for a, b in pairwise(times_s)) < 1.0
     sent = SentSetpoints()
-    sent.due(drive(8.0), 0.0, SETTINGS, confirmed=True)
-    assert sent.due(ControlCommand(Purpose.BRAKE, STOP, 0.0), 0.05, SETTINGS, confirmed=True) == [STOP]
-    assert GuidedPosition(NedPoint(8.0, 0.0)) in sent.due(drive(8.0), 0.1, SETTINGS, confirmed=True), (
+    sent.due(drive(8.0), 0.0, SETTINGS, 3.0, confirmed=True)
+    assert sent.due(ControlCommand(Purpose.BRAKE, STOP, 0.0), 0.05, SETTINGS, 3.0, confirmed=True) == [STOP]
+    assert GuidedPosition(NedPoint(8.0, 0.0)) in sent.due(drive(8.0), 0.1, SETTINGS, 3.0, confirmed=True), (
         "and so does driving on"
     )
 
 
 def test_a_changed_velocity_goes_out_at_once():
     sent = SentSetpoints()
-    sent.due(ControlCommand(Purpose.BRAKE, STOP, 0.0), 0.0, SETTINGS, confirmed=None)
+    sent.due(ControlCommand(Purpose.BRAKE, STOP, 0.0), 0.0, SETTINGS, 3.0, confirmed=None)
     back = GuidedVelocity(-0.4, 0.0)
-    assert sent.due(ControlCommand(Purpose.DRIVE, back, 0.0), 0.05, SETTINGS, confirmed=None) == [back]
+    assert sent.due(ControlCommand(Purpose.DRIVE, back, 0.0), 0.05, SETTINGS, 3.0, confirmed=None) == [back]
 
 
 def test_headings_are_repeated_slowly_and_followed_when_they_turn():
@@ -98,7 +101,7 @@ def test_speed_goes_with_positions_when_it_changes_and_now_and_then():
         return [
             (t, c.speed_m_s)
             for t, guide in guides
-            for c in sent.due(guide, t, SETTINGS, confirmed=True)
+            for c in sent.due(guide, t, SETTINGS, 3.0, confirmed=True)
             if isinstance(c, ChangeSpeed)
         ]
 
@@ -113,10 +116,13 @@ def test_speed_goes_with_positions_when_it_changes_and_now_and_then():
 
 def test_after_a_reset_everything_is_new():
     sent = SentSetpoints()
-    sent.due(drive(8.0), 0.0, SETTINGS, confirmed=True)
-    assert sent.due(drive(8.0), 0.1, SETTINGS, confirmed=True) == []
+    sent.due(drive(8.0), 0.0, SETTINGS, 3.0, confirmed=True)
+    assert sent.due(drive(8.0), 0.1, SETTINGS, 3.0, confirmed=True) == []
     sent.reset()
-    assert sent.due(drive(8.0), 0.2, SETTINGS, confirmed=True) == [GuidedPosition(NedPoint(8.0, 0.0)), ChangeSpeed(2.0)]
+    assert sent.due(drive(8.0), 0.2, SETTINGS, 3.0, confirmed=True) == [
+        GuidedPosition(NedPoint(8.0, 0.0)),
+        ChangeSpeed(2.0),
+    ]
 
 
 AHEAD = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(8.0, 0.0)), 2.0)
@@ -130,16 +136,23 @@ def test_a_place_in_degrees_needs_the_origin(origin: bool) -> None:
     far.write(rover.heartbeat(15) + (rover.origin() if origin else b""))
     list(autopilot.poll(0.0))
     sender = SetpointSender(autopilot, LiveSettings(Settings()), notices)
-    sender.speak(AHEAD, 0.1)
+    sender.speak(AHEAD, 0.1, 3.0)
     sent = messages(far.read())
     place = "SET_POSITION_TARGET_GLOBAL_INT" if origin else "SET_POSITION_TARGET_LOCAL_NED"
     assert [message.get_type() for message in sent] == [place, "COMMAND_LONG"]
     assert [text[:9] for text in notices.texts] == ([] if origin else ["Stopping:"])
     if not origin:
         assert (sent[0].vx, sent[0].vy, sent[0].yaw_rate) == (0.0, 0.0, 0.0), "a standstill"
-    sender.speak(AHEAD, 0.2)
+    sender.speak(AHEAD, 0.2, 3.0)
     assert messages(far.read()) == [], "nothing is due again yet"
-    sender.speak(None, 0.3)
+    sender.speak(None, 0.3, 3.0)
     assert messages(far.read()) == [], "nothing to say"
-    sender.speak(SetMode(4), 0.4)
+    sender.speak(SetMode(4), 0.4, 3.0)
     assert [message.command for message in messages(far.read())] == [176]
+
+
+@pytest.mark.parametrize(("lasts_s", "within_s"), [(3.0, 1.0), (1.0, 0.4), (0.3, 0.15)])
+def test_a_turn_is_said_again_before_the_autopilot_ends_it(lasts_s: float, within_s: float) -> None:
+    sent, turn = SentSetpoints(), ControlCommand(Purpose.LOOK, GuidedHeading(1.0), 0.0)
+    at_s = [t for t in np.arange(0.0, 4.0, 0.05) if sent.due(turn, t, SETTINGS, lasts_s, confirmed=None)]
+    assert np.diff(at_s).max() <= within_s + 1e-6 and np.diff(at_s).max() <= 0.5 * lasts_s + 1e-6

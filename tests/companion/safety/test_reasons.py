@@ -50,6 +50,7 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (Doubt.LIDAR_BLIND, ("lidar", 1.0), "lidar has seen nothing for over 1 s (on open ground: empty=5)"),
     (Doubt.LIDAR_LATE, ("lidar", 0.3), "lidar later than 0.3 s"),
     (Doubt.OTHER_COMPANION, (), "another companion drives this rover"),
+    (Doubt.TIMEOUT_LONG, (60.0,), "GUID_TIMEOUT is 60 s: a velocity would go on for too long (set 1 to 3)"),
     (Doubt.FENCE_BREACHED, (), "the autopilot's fence is breached"),
     (Doubt.BEYOND_BORDER, ("the yard",), "the rover is beyond the border of the yard"),
     (

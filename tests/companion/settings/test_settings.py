@@ -129,9 +129,3 @@ def test_a_number_in_quotes_is_refused_with_what_to_write(wrong: str) -> None:
     right = wrong.strip().replace(",", ".")
     with pytest.raises(SettingsError, match=rf"motion.turn_rad_s.*; write {right} without quotes$"):
         parse_settings({"motion": {"turn_rad_s": wrong}}, "test")
-
-
-def test_a_rover_that_is_known_may_not_differ_more_than_one_that_is_not() -> None:
-    parse_settings({"motion": {"off_model": 0.05}}, "test")
-    with pytest.raises(SettingsError, match=r"motion: off_model_known 0\.5 lies above off_model 0\.3"):
-        parse_settings({"motion": {"off_model_known": 0.5}}, "test")

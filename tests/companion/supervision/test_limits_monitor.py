@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, cast
+
+import pytest
 
 from companion.core.severity import Severity
 from companion.mavlink.autopilot_link import AutopilotLink
+from companion.safety.reasons import Doubt
 from companion.settings import Settings
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.limits_monitor import TRIES, LimitsMonitor
@@ -58,7 +62,7 @@ def test_one_that_is_never_answered_is_asked_for_a_few_times_and_then_told() -> 
     found = asked("motion-ga", tuple(name for name in PLANS if name != "ATC_STR_RAT_MAX"))
     assert found.names.count(LIMITS[0]) == 1 and found.names.count("ATC_STR_RAT_MAX") == TRIES
     assert found.said == ["The autopilot does not tell ATC_STR_RAT_MAX: taken to be no limit"]
-    several = asked("motion-ga", PLANS[2:-2]).said
+    several = asked("motion-ga", (TIMEOUT, *PLANS[2:-2])).said
     assert several == [
         "The autopilot does not tell ATC_ACCEL_MAX, CRUISE_THROTTLE: taken to be as shipped; "
         "ATC_STR_RAT_MAX: taken to be no limit"
@@ -68,10 +72,26 @@ def test_one_that_is_never_answered_is_asked_for_a_few_times_and_then_told() -> 
 def test_without_planned_motions_only_its_timeout_and_what_its_throttle_does_is_needed() -> None:
     needed = {TIMEOUT, *THROTTLE_SCALE}
     assert {*asked("points", tuple(needed)).names} == needed
-    assert asked("points", ()).said == [
+    assert asked("points", (TIMEOUT,)).said == [
         "The autopilot does not tell CRUISE_SPEED, CRUISE_THROTTLE: taken to be as shipped"
     ]
 
 
 def test_older_firmware_has_no_timeout_that_could_be_told() -> None:
-    assert asked("points", THROTTLE_SCALE).said == []
+    """What is taken instead is told where motions are planned; a ground station may set one later on newer firmware."""
+    rest = tuple(name for name in PLANS if name != TIMEOUT)
+    found = asked("motion-ga", rest, seconds=100)
+    assert found.said == ["The autopilot does not tell GUID_TIMEOUT: a velocity is taken to last 3 s"]
+    assert TRIES + 2 <= found.names.count(TIMEOUT) <= TRIES + 4
+    assert asked("points", rest).said == []
+    assert 3 <= asked("points", PLANS, seconds=100).names.count(TIMEOUT) <= 5
+
+
+@pytest.mark.parametrize(("timeout_s", "doubted"), [(1.0, False), (30.0, False), (31.0, True), (math.inf, True)])
+def test_with_a_timeout_that_is_too_long_to_plan_with_the_rover_stands(timeout_s: float, doubted: bool) -> None:
+    autopilot = Asked()
+    monitor = LimitsMonitor(cast(AutopilotLink, cast(Any, autopilot)), LiveSettings(Settings()), autopilot)
+    event = ParameterSeen(0.0, TIMEOUT, timeout_s)
+    monitor.take(event, fold(VehicleState(), event))
+    found = monitor.doubt(0.0)
+    assert (found is not None and found.kind is Doubt.TIMEOUT_LONG) is doubted

@@ -6,10 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from companion.core.frames import LocalFrame, NedPoint
+import pytest
+
+from companion.core.frames import LocalFrame, NedPoint, Pose
 from companion.safety.reasons import Doubt
 from companion.settings import Settings
 from companion.supervision.localization_monitor import (
+    ANSWERED_S,
     ASK_PLACES_S,
     CALM_S,
     ONCE_S,
@@ -18,7 +21,7 @@ from companion.supervision.localization_monitor import (
     WANDERINGS,
     LocalizationMonitor,
 )
-from companion.vehicle.dead_reckoning import Drift
+from companion.vehicle.dead_reckoning import Drift, drift_after
 from companion.vehicle.events import (
     GpsSeen,
     HomeSeen,
@@ -52,8 +55,15 @@ class Located(Desk):
     def hear_origin(self, by_m: float = 0.0, *, settled: bool = True) -> None:
         origin = LocalFrame(PLACE).to_geo(NedPoint(by_m, 0.0))
         self.monitor.take(OriginSeen(self.now_s, origin), replace(self.run.vehicle, wander=Drift(settled=settled)))
+        self.see()
+
+    def see(self) -> None:
+        """A scan of now is taken into the map."""
         self.clock.time_s += 0.001
-        self.report()  # with a scan of now
+        seen = vehicle(self.now_s).scan_ahead
+        assert seen is not None
+        self.executor.map_scan(Pose(0.0, 0.0, 0.0, self.now_s), 0.0, seen.scan)
+        self.report()
 
     @property
     def doubt(self) -> Doubt | None:
@@ -126,12 +136,51 @@ def test_a_rover_whose_map_was_forgotten_stands_until_something_ahead_is_on_it_a
     located = Located(tmp_path)
     located.report(jump_m=5.0)
     located.clock.time_s += SETTLED_S + 0.01
-    blind = replace(vehicle(located.now_s), scan_ahead=vehicle(located.now_s - 0.1).scan_ahead)
-    located.monitor.take(OriginSeen(located.now_s, PLACE), blind)
-    for ahead_s, doubt in ((-0.1, Doubt.MAP_EMPTY), (0.1, None)):
-        heard = replace(blind, scan_ahead=vehicle(located.now_s + ahead_s).scan_ahead)
-        located.monitor.take(GpsSeen(located.now_s, GpsFix.RTK_FIXED, 10), heard)
-        assert located.doubt is doubt and not located.monitor.position_doubted
+    located.monitor.take(OriginSeen(located.now_s, PLACE), vehicle(located.now_s - 0.1))
+    located.clock.time_s += 0.1
+    located.report()
+    assert located.doubt is Doubt.MAP_EMPTY, "a scan came, but the rover turned too fast to map it"
+    assert not located.monitor.position_doubted
+    located.see()
+    assert located.doubt is None
+
+
+def test_while_it_settles_the_origin_must_be_heard_or_hold_follows(tmp_path: Path) -> None:
+    located = Located(tmp_path)
+    located.report(wander=Drift(quick_m=2.0))
+    located.clock.time_s += SETTLED_S + 0.1
+    located.hear_origin(settled=False)
+    assert located.doubt is Doubt.POSITION_SETTLES
+    located.clock.time_s += ANSWERED_S + 0.1
+    assert located.doubt is Doubt.POSITION_WANDERED
+
+
+@pytest.mark.parametrize("lead_s", [0.0, 0.2, 0.4])
+def test_a_position_that_steps_before_the_receiver_tells_of_its_fix_moves_the_map(
+    tmp_path: Path, lead_s: float
+) -> None:
+    """Again and again: it is no position that wanders."""
+    located = Located(tmp_path)
+    drift, before = Drift(), LocalPositionSeen(located.now_s, located.now_s, 0.0, 0.0, 0.0, 0.0)
+
+    def go(seconds: float, fix: GpsFix, north_m: float) -> None:
+        nonlocal drift, before
+        for _ in range(round(seconds / 0.1)):
+            located.clock.time_s += 0.1
+            located.monitor.take(GpsSeen(located.now_s, fix, 10), located.run.vehicle)
+            position = LocalPositionSeen(located.now_s, located.now_s, north_m, 0.0, 0.0, 0.0)
+            drift, before = drift_after(drift, before, position), position
+            located.monitor.take(position, replace(vehicle(located.now_s), position=position, wander=drift))
+
+    go(4.0, GpsFix.RTK_FLOAT, 0.0)
+    for fix, other, north_m in ((GpsFix.RTK_FLOAT, GpsFix.RTK_FIXED, 0.7), (GpsFix.RTK_FIXED, GpsFix.RTK_FLOAT, 0.0)):
+        go(lead_s, fix, north_m)
+        go(0.4, other, north_m)
+        assert located.doubt is Doubt.FIX_CHANGED
+        go(4.0, other, north_m)
+        assert located.doubt is None
+    assert [text for text in located.notices.told if "forgotten" in str(text)] == []
+    assert located.executor.maps_begun == 2
 
 
 def test_reports_that_are_missing_while_the_position_steps_with_the_fix_end_in_a_new_map(tmp_path: Path) -> None:

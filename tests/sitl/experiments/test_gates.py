@@ -66,7 +66,7 @@ def test_gates_are_driven_with_the_guard_or_without_it(monkeypatch: pytest.Monke
         assert report.section_name == ("gates" if guarded else "gates-strict")
         asked.clear()
     report = gates.run(Options(runs=1, setups=("strict",), timeout_s=1.0), lambda done, of: None)
-    assert set(asked) == {(False, 1.0)} and report.section_name == "gates-guid-timeout-strict"
+    assert set(asked) == {(False, 1.0)} and report.section_name == "gates-guid-timeout-1-strict"
     assert "--guid-timeout 1" in report.section() and "ends a velocity after 1 s" in report.section()
     for wrong in ("jackal", "guarded,strict"):
         refused = CliRunner().invoke(app, ["experiment", "gates", "--setups", wrong])
