@@ -40,7 +40,7 @@ class GuidedPosition:
 class GuidedVelocity:
     """Drive forwards (negative: backwards) with a turn rate, clockwise.
 
-    The autopilot stops 3 s after the last one (GUID_TIMEOUT).
+    The autopilot stops 3 s after the last one, or as GUID_TIMEOUT says.
     """
 
     forward_m_s: float

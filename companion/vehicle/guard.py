@@ -1,6 +1,6 @@
 """The guard: a script on the autopilot that stops the rover when the companion falls silent.
 
-A velocity told to ArduRover lasts three seconds. With the script it lasts for a fraction of one, and the companion may
+A velocity told to ArduRover lasts three seconds, or GUID_TIMEOUT. With the script it lasts for a fraction of one, and the companion may
 tell higher speeds near obstacles. ``guard.lua`` is the script itself.
 
 Nouns: guard.
@@ -16,7 +16,7 @@ waits, negative while the present HOLD is its doing."""
 FRESH_S = 1.3
 """It speaks twice a second; without a word for so long it is not there."""
 IN_TIME_S = 0.95
-"""With a guard that waits longer, motions are planned with more room, as without one."""
+"""With a guard that waits longer the rover is driven as without one."""
 FILE = "companion_guard.lua"
 COMPONENT = 191
 
