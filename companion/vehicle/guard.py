@@ -1,7 +1,7 @@
 """The guard: a script on the autopilot that stops the rover when the companion falls silent.
 
-A velocity told to ArduRover lasts three seconds, or GUID_TIMEOUT. With the script it lasts for a fraction of one, and the companion may
-tell higher speeds near obstacles. ``guard.lua`` is the script itself.
+A velocity told to ArduRover lasts three seconds, or GUID_TIMEOUT. With the script it lasts for a fraction of one, and
+the companion may tell higher speeds near obstacles. ``guard.lua`` is the script itself.
 
 Nouns: guard.
 """
