@@ -68,6 +68,8 @@ class LimitsMonitor(Monitor):
     def _ask_timeout(self, now_s: float, *, plans: bool) -> None:
         """Each second until it is known, or a few times; then seldom. Older firmware has none, and that is told."""
         known = TIMEOUT in self._vehicle.parameters
+        if known and math.isinf(self._timeout_s):
+            self._timeout_s = now_s
         if now_s - self._timeout_s < (TIMEOUT_AGAIN_S if known or self._timeout_tries >= TRIES else ASK_S):
             return
         self._timeout_s = now_s

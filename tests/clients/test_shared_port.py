@@ -123,7 +123,7 @@ def test_mavproxy_as_the_page_starts_it_and_it_loads_our_parameters(rover: Rover
         with ours(tmp_path, "companion", "params", "--write", file, "--guard", "--station") as writer:
             assert writer.ended() == 0
         ground.says(r"Received \d+ parameters")
-        ground.told(f"param load {file}", r"Loaded 14 parameters from .* \(changed 3\)")
+        ground.told(f"param load {file}", r"Loaded 14 parameters from .* \(changed 4\)")
         check = ["params", "--check", "--guard", "--station", "--connect", f"udpin:127.0.0.1:{udp}"]
         with ours(tmp_path, "companion", *check, "--state", tmp_path / "checked") as checker:
             checker.says("all 14 are as wanted")

@@ -79,9 +79,11 @@ def test_the_table_counts_what_it_says() -> None:
 
 
 def test_chosen_missions_die_as_they_do_among_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    def one(mission: Mission, controller: str, guarded: bool, off: float, seed: int, count: int) -> list[Death]:
+    def one(mission: Mission, controller: str, *others: float) -> list[Death]:
+        guarded, off, timeout_s, seed, count = others
+        assert (guarded, off, timeout_s) == (False, 0.3, 3.0)
         suite = "" if mission.sitl is None else str(mission.sitl.sensors)
-        return [Death(str(mission.source), suite, controller, seed, 0.0, 0.0, 0, 0, 0.0, float(count))]
+        return [Death(str(mission.source), suite, controller, int(seed), 0.0, 0.0, 0, 0, 0.0, float(count))]
 
     monkeypatch.setattr(dead_companion, "deaths_of", one)
     maps = MISSIONS / "maps"

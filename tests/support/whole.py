@@ -97,6 +97,7 @@ class Whole:
             AttitudeSeen(now_s, now_s, 0.0, 0.0),
             EkfStatusSeen(now_s, EKF_GOOD),
             ThrottleSeen(now_s, 0.0),
+            ParameterSeen(now_s, "GUID_TIMEOUT", 3.0),
             ParameterSeen(now_s, "CRUISE_SPEED", 3.0),
             ParameterSeen(now_s, "CRUISE_THROTTLE", 75.0),
             RangeSeen(now_s, RangeScan(now_s, bearings, ranges, 0.1, 8.0, 0.1, "lidar")),
