@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.core.scan import WIRED, RangeScan
 from companion.vehicle.events import (
@@ -56,6 +57,11 @@ FAR_M = 1e6
 THIN_RAD = math.radians(10.0)
 """A beam no wider than this looks along one line: what it hits straight ahead comes nearer as the rover does."""
 AHEAD_RAD = math.radians(15.0)
+MANY = 8
+"""Directions of a scan that tells more than a few sonars."""
+ALONE_M, ALONG_RAD = 1.5, math.radians(80.0)
+"""A single echo of such a scan, farther away than this and not straight aside, does not stay the same while the rover
+drives: it is no mast, and no wall beside."""
 NEAREST_OF_ALL = "rangefinder"
 """RANGEFINDER: the reading of the nearest of all sensors, whichever way that one looks."""
 FORGOTTEN_S = 5.0
@@ -180,7 +186,15 @@ def _telling(scan: RangeScan) -> tuple[float, float]:
     if different > 1:
         return (STUCK_M if different >= DISTINCT else FEW_M), STUCK_RAD
     thin = len(scan.bearing_rad) * scan.beam_width_rad <= THIN_RAD
+    if np.count_nonzero(seen) == 1 and len(scan.bearing_rad) >= MANY and _lies_along(scan, seen):
+        return FEW_M, STUCK_RAD
     if not thin or different == 0 or scan.source == NEAREST_OF_ALL:
         return math.inf, math.inf
     aside_rad = abs(math.remainder(float(scan.bearing_rad[0]), math.pi))
     return (STUCK_M if aside_rad <= AHEAD_RAD else math.inf), STUCK_RAD
+
+
+def _lies_along(scan: RangeScan, seen: NDArray[np.bool_]) -> bool:
+    """Whether all that was seen is far away, and ahead or behind rather than straight aside."""
+    aside_rad = np.abs((scan.bearing_rad[seen] + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
+    return bool(np.all(scan.range_m[seen] > ALONE_M) and np.all(aside_rad <= ALONG_RAD))

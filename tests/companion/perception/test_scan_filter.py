@@ -87,6 +87,9 @@ def noticed_s(readings: list[float], motion: str, bearing_rad: list[float] | Non
 MANY = [1.0 + 0.01 * i for i in range(72)]
 NOTHING = [math.inf] * 72
 WALL = [math.inf] * 70 + [7.1, 6.9]
+ALONE = [2.15] + [math.inf] * 71
+ROUND_RAD = [math.radians(290.0 + 5.0 * i) for i in range(72)]
+ASIDE_RAD = [math.radians(272.0 + 5.0 * i) for i in range(72)]
 
 
 @pytest.mark.parametrize(
@@ -106,6 +109,10 @@ WALL = [math.inf] * 70 + [7.1, 6.9]
         ([3.0], [math.radians(45.0)], "turning", STUCK_S + 0.1),
         ([math.inf], [0.0], "driving", math.inf),
         ([3.0] * 40, None, "driving", math.inf),  # a wide sonar, or a proximity sector
+        (ALONE, ROUND_RAD, "driving", 1.2),
+        (ALONE, ROUND_RAD, "turning", STUCK_S + 0.1),
+        (ALONE, ASIDE_RAD, "driving", math.inf),  # a wall beside, of which no more is in reach
+        ([1.2] + [math.inf] * 71, ROUND_RAD, "driving", math.inf),  # a mast
     ],
 )
 def test_the_same_readings_are_noticed_when_they_would_have_to_change(readings, bearing_rad, motion, limit_s):
