@@ -6,9 +6,12 @@ import base64
 import html
 import io
 from collections.abc import Container, Iterable, Sequence
+from itertools import repeat
 
 from matplotlib.figure import Figure
 
+SERVED = '<html class="served"'
+"""How a page begins whose links somebody answers; in a file they are plain text."""
 WIDE_LETTERS = 30
 """Longer words of a column are wrapped."""
 STYLE = """
@@ -35,7 +38,13 @@ th[aria-sort=descending]::after { content: " ▼"; }
 figure { margin: 1rem 0; background: #fff; padding: .5rem; display: inline-block; max-width: 100%; }
 img { max-width: 100%; height: auto; } figcaption { color: #444; font-size: .9em; }
 code { font-size: .85em; background: var(--soft); padding: .1rem .3rem; user-select: all; }
+html:not(.served) .replay { color: inherit; text-decoration: none; pointer-events: none; }
+html:not(.served) .replays { display: none; }
 """
+
+
+REPLAYS = '<span class="replays">A click on a seed drives the run again and shows it. </span>'
+"""Told where the page is served."""
 
 
 def number_of(count: int, what: str) -> str:
@@ -55,23 +64,33 @@ def table(
     text: Container[int],
     wide: Container[int] = (),
     code: Container[int] = (),
+    runs: Sequence[str] = (),
+    linked: int = 0,
 ) -> str:
     """``text``: the numbers of the columns that are words; ``wide``: of those that are wrapped; ``code``: of commands.
 
-    The others are figures.
+    The others are figures. ``runs``: the run of each line; its cell ``linked`` is a link that drives it again, where
+    the page is served.
     """
 
     def kind(number: int) -> str:
         return "wide" if number in wide else "text" if number in text or number in code else ""
 
-    def cell(number: int, content: str) -> str:
+    def cell(number: int, content: str, run: str) -> str:
         inside = html.escape(content)
-        return f'<td class="{kind(number)}">{f"<code>{inside}</code>" if number in code else inside}</td>'
+        if number in code:
+            inside = f"<code>{inside}</code>"
+        if run and number == linked:
+            inside = f'<a class="replay" href="/replay/{run}" target="_blank">{inside}</a>'
+        return f'<td class="{kind(number)}">{inside}</td>'
 
     top = "".join(
         f'<th class="{"text" if kind(number) else ""}">{html.escape(name)}</th>' for number, name in enumerate(head)
     )
-    body = "".join(f"<tr>{''.join(cell(n, content) for n, content in enumerate(line))}</tr>" for line in lines)
+    body = "".join(
+        f"<tr>{''.join(cell(n, content, run) for n, content in enumerate(line))}</tr>"
+        for line, run in zip(lines, runs or repeat(""), strict=False)
+    )
     return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
 
 

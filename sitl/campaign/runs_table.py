@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 
 from sitl.campaign.campaign_file import CampaignTable
-from sitl.campaign.page_parts import long_columns, table
+from sitl.campaign.page_parts import REPLAYS, long_columns, table
 from sitl.campaign.policies import broken
 from sitl.campaign.run_spec import AXES, RunResult, RunSpec
 from sitl.campaign.summary import Runs, labels, varied
@@ -35,9 +35,17 @@ def runs_table(campaign: CampaignTable, runs: Runs, source: Path) -> str:
     long = long_columns(lines, range(len(axes)))
     text = {*range(len(axes)), *(head.index(name) for name in ("broke", "outcome"))}
     columns = [*range(len(axes)), *(head.index(name) for name in CHOSEN)]
-    whole = table(head, lines, text, wide={*long, head.index("last word")}, code={len(head) - 1})
+    whole = table(
+        head,
+        lines,
+        text,
+        wide={*long, head.index("last word")},
+        code={len(head) - 1},
+        runs=[spec.id for spec, _ in ordered],
+        linked=head.index("seed"),
+    )
     return (
-        f"<h2>Every run</h2><p>{_told(campaign, len(runs))}</p>"
+        f"<h2>Every run</h2><p>{REPLAYS}{_told(campaign, len(runs))}</p>"
         f'<p class="filter" id="filter" data-columns="{" ".join(map(str, columns))}" hidden>'
         '<label>with the words <input type="search"></label><output></output></p>'
         f'<div class="long" id="runs">{whole}</div>'

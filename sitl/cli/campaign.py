@@ -21,6 +21,7 @@ from sitl.campaign.campaign_file import CampaignError, load_campaign
 from sitl.campaign.drive_run import driven, mission_of, prepared, settings_of
 from sitl.campaign.page_parts import number_of
 from sitl.campaign.policies import ERROR
+from sitl.campaign.replay_server import ReplayServer, ServeError
 from sitl.campaign.run_spec import RunSpec, specs_of
 from sitl.campaign.run_store import Digests, RunStore, kept_run
 from sitl.campaign.summary import Runs
@@ -29,16 +30,19 @@ from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
 from sitl.cli.extras import parquet_fault, statistics_fault
 from sitl.cli.runs import FILE, alone_in, check_all, progress, say_what_there_is, warm_up_all
 from sitl.cli.search import place_of_search, search_campaign
+from sitl.cli.serve_report import replay_of, serve_report
 from sitl.generators.made_ground import NoWayError
 from sitl.scenario import ScenarioError
 from sitl.search.goals import Goal
 
-BAD_INPUT = (CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError, NoWayError)
+BAD_INPUT = (
+    CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError, NoWayError, ServeError,
+)  # fmt: skip
 EXIT_FAILED = 3
 BUDGET = 1000
 APART = {
     "--search": ("--cluster", "--parquet"),
-    "--replay": ("--cluster", "--parquet", "--jobs", "--budget"),
+    "--replay": ("--cluster", "--parquet", "--jobs", "--budget", "--serve"),
     "--cluster": ("--jobs",),
 }
 """Options that do not go together."""
@@ -79,6 +83,16 @@ def campaign(
     parquet: Annotated[
         bool, typer.Option("--parquet", help=f"Write {PARQUET}, too (needs the extra parquet).")
     ] = False,
+    serve: Annotated[
+        int | None,
+        typer.Option(
+            metavar="PORT",
+            min=1,
+            max=65535,
+            help="Then serve the report on this machine, with a link at each run that drives it again and shows it, "
+            "until Ctrl-C.",
+        ),
+    ] = None,
 ) -> None:
     """Drive every run of CAMPAIGN: worlds x planners x controllers x sensors x faults x settings x seeds.
 
@@ -96,14 +110,16 @@ def campaign(
                 "--parquet": parquet,
                 "--jobs": jobs > 1,
                 "--out": out is not None,
+                "--serve": serve is not None,
             }
         )
+        server = None if serve is None else ReplayServer(serve)
         if replay is not None or record is not None:
             _drive_again(file, replay, record, search, out)
         elif search is not None:
-            search_campaign(file, search, budget or BUDGET, out, jobs)
+            search_campaign(file, search, budget or BUDGET, out, jobs, server)
         else:
-            drive_campaign(file, out, jobs, cluster, parquet=parquet)
+            drive_campaign(file, out, jobs, cluster, parquet=parquet, server=server)
     except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -122,9 +138,15 @@ def _check_together(given: Mapping[str, bool]) -> None:
 
 
 def drive_campaign(
-    file: Path, out: Path | None, jobs: int, cluster: str | None = None, *, parquet: bool = False
+    file: Path,
+    out: Path | None,
+    jobs: int,
+    cluster: str | None = None,
+    *,
+    parquet: bool = False,
+    server: ReplayServer | None = None,
 ) -> Runs:
-    """Drive what is left of a campaign and put everything out. Raises one of ``BAD_INPUT``.
+    """Drive what is left of a campaign, put everything out, and serve it. Raises one of ``BAD_INPUT``.
 
     When it is stopped, what is done is put out; then StoppedError.
     """
@@ -153,6 +175,9 @@ def drive_campaign(
             put_out(console, table, runs, file, place, parquet=parquet)
     if stopped is not None:
         raise stopped
+    if server is not None:
+        commands = {spec: ("campaign", str(file), "--replay", spec.id) for spec, _ in runs}
+        serve_report(server, place, [replay_of(spec, digests, command) for spec, command in commands.items()])
     errors = sum(result.outcome == ERROR for _, result in runs)
     if errors:
         ended = f"{number_of(errors, 'run')} ended with an error"

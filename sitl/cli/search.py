@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -15,10 +14,12 @@ from companion.cli.entry import StoppedError
 from companion.cli.inputs import writable, written
 from sitl.campaign.campaign_file import CampaignError, CampaignTable, load_campaign
 from sitl.campaign.page_parts import number_of
+from sitl.campaign.replay_server import Replay, ReplayServer
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.workers import driven_here
 from sitl.cli.runs import FILE, alone_in, check_all, progress, say_what_there_is, warm_up_all
+from sitl.cli.serve_report import replay_of, serve_report
 from sitl.search.found_file import counted_from, differences, write_find
 from sitl.search.genes import genes_of
 from sitl.search.goals import Goal
@@ -112,7 +113,9 @@ def place_of_search(table: CampaignTable, goal: Goal, out: Path | None) -> Path:
     return (out or Path("out") / table.name) / f"search-{goal}"
 
 
-def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs: int) -> None:
+def search_campaign(
+    file: Path, goal: Goal, budget: int, out: Path | None, jobs: int, server: ReplayServer | None = None
+) -> None:
     """All of it. Raises what a campaign raises."""
     table, folder, console = load_campaign(file), file.resolve().parent, Console()
     place = place_of_search(table, goal, out)
@@ -144,6 +147,16 @@ def search_campaign(file: Path, goal: Goal, budget: int, out: Path | None, jobs:
             kept = len(store.results) - before
             raise StoppedError(f"{number_of(kept, 'run')}, kept in {store.file}; the same command goes on")
         keeper.sum_up()
+    if server is not None:
+        serve_report(server, place, _replays(result, digests))
+
+
+def _replays(result: SearchResult, digests: Digests) -> Iterator[Replay]:
+    """Of all finds, and of those that were made small."""
+    for run_id, finds in result.wrong.items():
+        yield replay_of(finds[0].spec, digests, (*result.command, "--replay", run_id))
+    for kept in result.kept:
+        yield replay_of(kept.spec, Digests(kept.file.parent), kept.replay)
 
 
 def _check_moves(file: Path, table: CampaignTable, bases: Sequence[RunSpec]) -> None:
@@ -156,10 +169,10 @@ def _check_moves(file: Path, table: CampaignTable, bases: Sequence[RunSpec]) -> 
             )
 
 
-def _command(file: Path, goal: Goal, out: Path | None) -> str:
+def _command(file: Path, goal: Goal, out: Path | None) -> tuple[str, ...]:
     """Of the search, without what differs from time to time."""
     place = () if out is None else ("--out", str(out))
-    return shlex.join(("rover-sitl", "campaign", str(file), "--search", goal.value, *place))
+    return "campaign", str(file), "--search", goal.value, *place
 
 
 def _search(

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from companion.storage.files import whole_file
 from sitl.campaign.campaign_file import CampaignTable
-from sitl.campaign.page_parts import document, long_columns, number_of, picture, table
+from sitl.campaign.page_parts import REPLAYS, document, long_columns, number_of, picture, table
 from sitl.campaign.run_spec import RunSpec
 from sitl.campaign.summary import labels, varied
 from sitl.campaign.tables import records_of, write_records
@@ -39,9 +39,14 @@ class KeptFind:
     file: Path
 
     @property
+    def replay(self) -> tuple[str, ...]:
+        """What drives it again: of ``rover-sitl``, without the place of the record."""
+        return "campaign", str(self.file), "--replay", self.spec.id
+
+    @property
     def command(self) -> str:
         """What drives it again, with a record."""
-        return f"rover-sitl campaign {shlex.quote(str(self.file))} --replay {self.spec.id} --record out/{self.spec.id}"
+        return f"rover-sitl {shlex.join(self.replay)} --record out/{self.spec.id}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +54,8 @@ class SearchResult:
     """All that a search has done so far.
 
     ``left_out``: kinds of finds that were too many to be made small; ``tries``: the runs that made finds small;
-    ``ended``: it was not stopped. ``found``: all finds, also of the tries. ``command``: of the search.
+    ``ended``: it was not stopped. ``found``: all finds, also of the tries. ``command``: of the search,
+    as ``rover-sitl`` is told it.
     """
 
     goal: Goal
@@ -60,7 +66,7 @@ class SearchResult:
     tries: int
     ended: bool
     found: Sequence[Find]
-    command: str
+    command: tuple[str, ...]
 
     @property
     def evaluations(self) -> int:
@@ -136,13 +142,19 @@ def _finds(result: SearchResult) -> list[str]:
         for kept in result.kept
     ]  # fmt: skip
     wide = {*long_columns(lines, [1]), 7}
-    whole = table(FIND_HEAD, lines, text={0, 1, 3}, wide=wide, code={8}) if lines else "<p>None is made small yet.</p>"
+    whole = (
+        table(
+            FIND_HEAD, lines, text={0, 1, 3}, wide=wide, code={8}, runs=[one.spec.id for one in result.kept], linked=2
+        )
+        if lines
+        else "<p>None is made small yet.</p>"
+    )
     more = f" {result.left_out} more kinds were left out." if result.left_out else ""
     return [
-        f"<p>Runs of the search that went wrong: {html.escape(told)}. The first of each rule and combination is made "
-        "as small as it can be: <i>differs</i> is all that it needs beside the usual. Its file, a campaign of one run, "
-        "stands in the command that drives it again with a record; <code>rover-companion report FOLDER</code> shows "
-        f"the record.{more}</p>",
+        f"<p>{REPLAYS}Runs of the search that went wrong: {html.escape(told)}. The first of each rule and combination "
+        "is made as small as it can be: <i>differs</i> is all that it needs beside the usual. Its file, a campaign of "
+        "one run, stands in the command that drives it again with a record; <code>rover-companion report FOLDER</code> "
+        f"shows the record.{more}</p>",
         whole,
     ]
 
@@ -157,17 +169,19 @@ def _every_find(result: SearchResult) -> list[str]:
             " ".join(find.rule for find in finds), finds[0].base.world, f"{finds[0].base.seed}",
             finds[0].result.outcome, f"{finds[0].result.touched}", f"{finds[0].result.refused}",
             f"{finds[0].result.clearance_m:.2f}", differences(finds[0]),
-            f"{result.command} --replay {run_id} --record out/{run_id}",
+            f"rover-sitl {shlex.join(result.command)} --replay {run_id} --record out/{run_id}",
         )
         for run_id, finds in list(wrong.items())[:MOST_FINDS]
     ]  # fmt: skip
-    wide = {*long_columns(lines, [1]), 7}
+    shown = table(
+        FIND_HEAD, lines, text={0, 1, 3}, wide={*long_columns(lines, [1]), 7}, code={8}, runs=list(wrong), linked=2
+    )
     first = f"The first {MOST_FINDS} of {len(wrong)} runs; evaluations.csv has the <i>id</i> of each. "
     return [
-        f"<h2>Every find</h2><p>{first if len(wrong) > MOST_FINDS else ''}As they were found, before any was made "
-        "small, and what was found while others were made small. The commands are to be given in the folder from which "
-        "the search was driven.</p>",
-        f'<div class="long">{table(FIND_HEAD, lines, text={0, 1, 3}, wide=wide, code={8})}</div>',
+        f"<h2>Every find</h2><p>{REPLAYS}{first if len(wrong) > MOST_FINDS else ''}As they were found, before any was "
+        "made small, and what was found while others were made small. The commands are to be given in the folder from "
+        "which the search was driven.</p>",
+        f'<div class="long">{shown}</div>',
     ]
 
 

@@ -1,7 +1,8 @@
-"""The report's table of runs in a browser: it is filtered and sorted, and stands without a script, too."""
+"""The report's table of runs in a browser: filtered and sorted, plain without a script, and with links to its runs."""
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,8 @@ from sitl.campaign.page_parts import document
 from sitl.campaign.run_spec import RunResult, specs_of
 from sitl.campaign.runs_table import runs_table
 from tests.clients.browser import Page, needs_browser, page
+from tests.clients.program import ours
+from tests.sitl.network.test_server import free_port
 
 pytestmark = [needs_browser, pytest.mark.thorough]
 
@@ -63,3 +66,22 @@ def test_rows_are_filtered_and_sorted(report: Page) -> None:
     assert column(report, 8)[:3] == ["8.5", "9.5", "10.5"], "as numbers"
     report.click("#runs th:nth-child(9)")
     assert column(report, 8)[0] == "22.5"
+
+
+def test_a_click_on_a_seed_drives_the_run_again_and_shows_it(tmp_path: Path) -> None:
+    file, port = tmp_path / "short.toml", free_port()
+    file.write_text('worlds = ["clutter target_east_m=8"]\nruns = 1\ntime_limit_s = 120.0\n')
+    with (
+        ours(tmp_path, "sitl", "campaign", file, "--out", tmp_path / "out", "--serve", port) as served,
+        page() as shown,
+    ):
+        served.says(f"served at http://127.0.0.1:{port}/")
+        shown.open((tmp_path / "out" / "report.html").as_uri())
+        assert "A click on a seed" not in shown.text, "nobody would answer"
+        shown.open(f"http://127.0.0.1:{port}/")
+        shown.shows("A click on a seed")
+        shown.click("#runs a.replay")
+        shown.until(lambda: len(shown.driver.window_handles) == 2)
+        shown.driver.switch_to.window(shown.driver.window_handles[-1])
+        shown.shows("1 of 1 targets reached", "record, simulated")
+        assert served.end(signal.SIGINT) == 0
