@@ -41,6 +41,7 @@ from sitl.experiments.experiment import (
     Options,
     chosen_controllers,
     each,
+    unknown,
 )
 from sitl.experiments.off_model import SHIPPED, Limits, off_model
 from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table, without_intervals
@@ -441,5 +442,5 @@ def _chosen_setups(options: Options) -> tuple[Setup, ...]:
     """Raises ExperimentError for one that does not exist."""
     for name in options.setups:
         if name not in tuple(Setup):
-            raise ExperimentError(f"--setups: {name!r:.60} is unknown; known are {', '.join(Setup)}")
+            raise unknown("--setups", name, Setup)
     return tuple(one for one in Setup if one in options.setups) or (Setup.GUARDED,)

@@ -28,13 +28,13 @@ from sitl.experiments.experiment import (
     GUARD,
     POINTS,
     Advance,
-    ExperimentError,
     ExperimentReport,
     Options,
     chosen_controllers,
     each,
     section_by_rule,
     shipped_missions,
+    unknown,
 )
 from sitl.experiments.off_model import scenario_off_model, taken_for
 from sitl.experiments.results_page import markdown_table, terminal_table
@@ -334,6 +334,6 @@ def shipped(options: Options) -> list[Mission]:
     named = {file.removesuffix(".toml"): file for file in MISSIONS}
     for name in options.missions:
         if name not in named:
-            raise ExperimentError(f"--missions: {name!r:.60} is unknown; known are {', '.join(named)}")
+            raise unknown("--missions", name, named)
     chosen = tuple(file for name, file in named.items() if name in options.missions)
     return [load_mission(file) for file in shipped_missions(options.maps, chosen or MISSIONS)]

@@ -28,6 +28,7 @@ from companion.settings import PlannerSettings
 from companion.settings.settings import CONTROLLERS, ControllerKind
 from companion.storage.files import why_no_file
 from companion.storage.shipped import SOURCE, shipped
+from companion.storage.validation import alike
 from sitl.experiments import drawing
 from sitl.experiments.results_page import write_section
 from sitl.worker_end import apart
@@ -129,13 +130,18 @@ class Options:
         return f"off by up to {100.0 * self.off:.0f} % from what the companion takes them for{late}{ends}"
 
 
+def unknown(option: str, name: str, known: Iterable[str], more: str = "") -> ExperimentError:
+    """The error for a name of a list that nobody knows. ``more``: said after those that are known."""
+    near = alike(name, known := tuple(known))
+    hint = f", did you mean {near!r}?" if near else ";"
+    return ExperimentError(f"{option}: {name!r:.60} is unknown{hint} known: {', '.join(known)}{more}")
+
+
 def chosen_controllers(options: Options, otherwise: tuple[ControllerKind, ...]) -> tuple[ControllerKind, ...]:
     """The controllers that were asked for, or others. Raises ExperimentError for one that does not exist."""
     for name in options.controllers:
         if name not in CONTROLLERS and not looks_own(OwnKind.CONTROLLER, name):
-            raise ExperimentError(
-                f"--controllers: {name!r:.60} is unknown; known are {', '.join(CONTROLLERS)}, and module:name"
-            )
+            raise unknown("--controllers", name, CONTROLLERS, ", and module:name")
         try:
             check_controller(name)
         except OwnPartError as error:

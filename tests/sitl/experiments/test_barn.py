@@ -314,7 +314,7 @@ def test_a_file_that_is_no_archive_is_refused_in_one_line(tmp_path: Path, conten
     file.write_bytes(content)
     with pytest.raises(ExperimentError, match=r"worlds\.npz: no archive of BARN worlds"):
         run(Options(1, archive=file), lambda done, total: None)
-    with pytest.raises(ExperimentError, match="--setups: 'fast' is unknown; known are guarded, strict, jackal"):
+    with pytest.raises(ExperimentError, match="--setups: 'fast' is unknown; known: guarded, strict, jackal"):
         run(Options(1, setups=("fast",)), lambda done, total: None)
     with pytest.raises(ExperimentError, match="--setups: points is driven with guarded only"):
         run(Options(1, controllers=("points",), setups=("strict",)), lambda done, total: None)

@@ -51,7 +51,7 @@ def test_some_missions_can_be_chosen_by_their_files() -> None:
         load_mission(MISSIONS / file).name for file in ("field.plan", "depot.toml")
     ]
     assert "--missions depot,field.plan" in Options(missions=("depot", "field.plan")).command("missions")
-    with pytest.raises(ExperimentError, match="--missions: 'hill' is unknown; known are open, one-obstacle"):
+    with pytest.raises(ExperimentError, match="--missions: 'hill' is unknown; known: open, one-obstacle"):
         shipped(Options(missions=("hill",)))
 
 
