@@ -98,6 +98,11 @@ class AutopilotLink:
         return self._link.description
 
     @property
+    def connected(self) -> bool:
+        """Whether the link has another end, as far as it can know."""
+        return self._link.connected
+
+    @property
     def trouble(self) -> str:
         """For the message that no rover is heard: the link, and what was heard instead."""
         refused = self._codec.refused_type

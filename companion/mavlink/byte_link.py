@@ -21,6 +21,11 @@ class ByteLink(Protocol):
         """The link and its present state, in words."""
         ...
 
+    @property
+    def connected(self) -> bool:
+        """Whether there is another end; True where nobody can know, as with UDP."""
+        ...
+
     def read(self) -> bytes:
         """The bytes that have arrived; may be empty."""
         ...
@@ -52,6 +57,11 @@ class MemoryLink:
     def description(self) -> str:
         """The link in words."""
         return "memory"
+
+    @property
+    def connected(self) -> bool:
+        """Always."""
+        return True
 
     def read(self) -> bytes:
         """All bytes that the other end has written since the last read."""

@@ -49,7 +49,12 @@ class SerialLink:
     @property
     def description(self) -> str:
         """The link in words."""
-        return self._name if self._port is not None else f"{self._name} (not there)"
+        return self._name if self.connected else f"{self._name} (not there)"
+
+    @property
+    def connected(self) -> bool:
+        """Whether the device is there."""
+        return self._port is not None
 
     @property
     def rivals(self) -> tuple[PortUser, ...]:

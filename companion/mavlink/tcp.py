@@ -172,7 +172,12 @@ class TcpServerLink:
     @property
     def description(self) -> str:
         """The link in words."""
-        return self._name if self._stream is not None else f"{self._name} (nobody has connected yet)"
+        return self._name if self.connected else f"{self._name} (nobody is connected)"
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a peer."""
+        return self._stream is not None
 
     @property
     def port(self) -> int:

@@ -65,6 +65,11 @@ class UdpLink:
         return self._name
 
     @property
+    def connected(self) -> bool:
+        """Always True: datagrams have no connection."""
+        return True
+
+    @property
     def port(self) -> int:
         """The local port, which matters if 0 was given."""
         return int(self._socket.getsockname()[1])

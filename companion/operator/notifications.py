@@ -95,6 +95,7 @@ class Notifier:
         self._slow_since_s: dict[int, float] = {}
         self._faults_told: set[str] = set()
         self._warned: set[str] = set()
+        self._connected = True
 
     def tell(self, text: str, severity: Severity) -> None:
         """Say it, unless it is what was said last."""
@@ -112,13 +113,25 @@ class Notifier:
             self.tell(text, Severity.WARNING)
 
     def note(self, text: str, severity: Severity) -> None:
-        """Keep a text of the autopilot's for the terminal."""
+        """Keep a text for the terminal alone, the autopilot's for example."""
         self.news.append(News(severity, text, own=False))
+
+    def _tell_link(self) -> None:
+        """That the link is cut, and that it is back: for the terminal alone, as nobody else would hear it."""
+        if self._autopilot.connected == self._connected:
+            return
+        self._connected = self._autopilot.connected
+        if self._connected:
+            self.note(f"the link is back: {self._autopilot.description}", Severity.INFO)
+        else:
+            self.note(f"the link is cut: {self._autopilot.description}; trying again", Severity.WARNING)
 
     def tell_faults(self, run: MissionRun, now_s: float, problems: tuple[str, ...]) -> None:
         """Faults that stop nothing, each told once. ``problems``: of the record and the state file."""
-        if run.vehicle.heartbeat is not None and self._autopilot.signing_trouble:
-            self.once(self._autopilot.signing_trouble)
+        if run.vehicle.heartbeat is not None:
+            self._tell_link()
+            if self._autopilot.signing_trouble:
+                self.once(self._autopilot.signing_trouble)
         if run.executor is None:
             for text in self.lasting_faults((), problems, now_s):  # a full disk can be mended before the mission begins
                 self.once(text)

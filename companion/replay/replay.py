@@ -57,6 +57,7 @@ class RecordPlayer:
     """Plays a record tick by tick: it is the link, the clock and the log of the companion that is run again."""
 
     description = "the recorded link"
+    connected = True
     problem = ""
 
     def __init__(

@@ -312,8 +312,8 @@ class TestUrls:
             ("udp:127.0.0.1:0", "udpin:127.0.0.1:0 (nobody has spoken yet)"),
             ("udpout:localhost:14550", "udpout:localhost:14550"),
             ("tcp:127.0.0.1:9", "tcp:127.0.0.1:9 (not connected: connection refused)"),
-            ("tcpin:127.0.0.1:0", "tcpin:127.0.0.1:0 (nobody has connected yet)"),
-            ("tcpin:[::1]:0", "tcpin:::1:0 (nobody has connected yet)"),
+            ("tcpin:127.0.0.1:0", "tcpin:127.0.0.1:0 (nobody is connected)"),
+            ("tcpin:[::1]:0", "tcpin:::1:0 (nobody is connected)"),
         ],
     )
     def test_a_network_link(self, url: str, description: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import threading
+from collections import deque
 from types import SimpleNamespace
 from typing import cast
 
@@ -22,6 +23,7 @@ from companion.operator.notifications import FAULT_AFTER_S, SAID_KEPT, News, Not
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase, WaitReason
 from companion.settings import LinkSettings
 from companion.storage.unbuffered import shared_with
+from companion.vehicle.events import HeartbeatSeen
 from companion.vehicle.state import VehicleState
 from tests.support.notices import HandClock
 from tests.support.served import wait_until
@@ -58,6 +60,29 @@ def test_a_record_that_has_ended_is_told_before_the_mission_begins() -> None:
     for now_s in (1.0, 2.0):
         one.tell_faults(run, now_s, ("the record has ended",))
     assert one.said == ["the record has ended"]
+
+
+def test_a_link_that_is_cut_and_comes_back_is_told_at_once_to_the_terminal_alone() -> None:
+    class Cable(MemoryLink):
+        connected = True
+        description = "serial:/dev/ttyACM0:115200"
+
+    cable = Cable(deque(), deque())
+    one = Notifier(AutopilotLink(cable, Codec(LinkSettings()), LinkSettings()), HandClock(), [])
+    run = cast(MissionRun, SimpleNamespace(executor=None, vehicle=VehicleState()))
+    cable.connected = False
+    one.tell_faults(run, 1.0, ())
+    assert one.news == [], "before the autopilot was heard the program says that it waits for it"
+    run.vehicle = VehicleState(heartbeat=HeartbeatSeen(1.0, 4, armed=True, system_id=1))
+    for now_s in (2.0, 2.1):
+        one.tell_faults(run, now_s, ())
+    cable.connected = True
+    for now_s in (9.0, 9.1):
+        one.tell_faults(run, now_s, ())
+    assert [(news.severity, news.text.partition(":")[0]) for news in one.news] == [
+        (Severity.WARNING, "the link is cut"), (Severity.INFO, "the link is back")
+    ]  # fmt: skip
+    assert one.said == []
 
 
 def test_only_the_newest_texts_are_kept() -> None:
