@@ -15,6 +15,7 @@ import numpy as np
 from companion.control.controller import STANDSTILL, ControlCommand
 from companion.control.drag import DragWatch, braked_harder
 from companion.control.following import GUARDED_S
+from companion.control.full_throttle import FullThrottle
 from companion.control.setpoint_check import SetpointCheck
 from companion.control.told import Told, after
 from companion.core.changed import changed
@@ -115,7 +116,7 @@ class MissionRun:
         self.start_paused = False
         """A pause was asked for before the mission began: it does not begin."""
         self.setpoint_check = SetpointCheck(notifier)
-        self._drag = DragWatch()
+        self._drag, self.full_throttle = DragWatch(), FullThrottle()
         self._told: ControlCommand | None = None
         """What was sent, or still held, in the tick before."""
         self._lately: Told = ()
@@ -223,6 +224,7 @@ class MissionRun:
         executor, view = self.executor, self.executor.view(self.vehicle, now_s)
         told = None if self._told is None else self._told.setpoint
         full_m_s = full_throttle_m_s(self.vehicle.parameters)
+        self.full_throttle.note(self.vehicle.throttle, full_m_s, view)
         held_m_s = self._drag.held_m_s(self.vehicle.throttle, full_m_s, view)
         view = changed(view, held_m_s=held_m_s, dragged_m_s=self._drag.dragged_m_s(), lately_held=self._drag.closes())
         view = changed(view, told=told, lately=self._lately, placed_s=self._placed_s)

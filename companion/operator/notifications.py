@@ -6,6 +6,7 @@ Nouns: notifier, status, outcome.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from companion.core.clock import Clock
@@ -19,6 +20,7 @@ from companion.navigation.field_step import Decision
 from companion.safety.mode_latch import Control
 from companion.safety.reasons import Activity, PowerReason, Reason
 from companion.vehicle.commands import StatusText
+from companion.vehicle.motion_limits import FASTEST, full_throttle_m_s
 
 NOT_FOLLOWED_S = 5.0
 """People are told when the autopilot's read-back has shown another target for this long."""
@@ -28,6 +30,8 @@ FAULT_AFTER_S = 5.0
 """A message rate that is too low for a moment is not told."""
 TICKS_KEPT = 100_000
 """The times of this many of the newest ticks are kept."""
+CRUISE_SET_PERCENT = 75.0
+"""The throttle that is advised, with the speed that belongs to it."""
 SAID_KEPT = 1000
 """This many texts are remembered as said."""
 
@@ -95,7 +99,7 @@ class Notifier:
         self._slow_since_s: dict[int, float] = {}
         self._faults_told: set[str] = set()
         self._warned: set[str] = set()
-        self._connected = True
+        self._connected, self._scale_told = True, False
 
     def tell(self, text: str, severity: Severity) -> None:
         """Say it, unless it is what was said last."""
@@ -142,6 +146,9 @@ class Notifier:
             self._followed_s = now_s
         elif now_s - self._followed_s > NOT_FOLLOWED_S:
             self.once("The autopilot follows another target than the one sent: does another program steer it?")
+        if run.full_throttle.doubted and run.full_throttle.m_s is not None and not self._scale_told:
+            self._scale_told = True
+            self.tell(_throttle_text(run.full_throttle.m_s, run.vehicle.parameters), Severity.WARNING)
         heartbeat = run.vehicle.heartbeat
         silent = heartbeat is None or now_s - heartbeat.time_s > SILENT_S  # then everything is missing
         rates = () if silent else self._autopilot.rate_faults
@@ -161,6 +168,17 @@ class Notifier:
         new = [text for what, text in texts.items() if what not in self._faults_told]
         self._faults_told.update(texts)
         return new
+
+
+def _throttle_text(seen_m_s: float, parameters: Mapping[str, float]) -> str:
+    """What to set where the scale of the throttle is far off."""
+    told_m_s, cruise_m_s = full_throttle_m_s(parameters), 0.01 * CRUISE_SET_PERCENT * seen_m_s
+    fastest_m_s = parameters.get(FASTEST, 0.0)
+    slower = f", WP_SPEED to {0.9 * seen_m_s:.1f}" if fastest_m_s > seen_m_s else ""
+    return (
+        f"The rover drives {seen_m_s:.1f} m/s for full throttle, not {told_m_s:.1f} as CRUISE_SPEED and "
+        f"CRUISE_THROTTLE say: on firm ground set them to {cruise_m_s:.1f} and {CRUISE_SET_PERCENT:.0f}{slower}"
+    )
 
 
 def _rate_text(fault: RateFault) -> str:
