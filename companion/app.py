@@ -141,6 +141,11 @@ class Companion:
         return executor.estimator.estimate if executor is not None and executor.learns else None
 
     @property
+    def full_throttle_m_s(self) -> float | None:
+        """How fast the rover goes with its throttle fully open; None before enough was seen."""
+        return self.mission_run.full_throttle.m_s
+
+    @property
     def news(self) -> tuple[News, ...]:
         """What was said in this tick, by the autopilot as well."""
         return tuple(self._notifier.news)

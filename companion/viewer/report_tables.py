@@ -138,7 +138,7 @@ def _figures(run: Run) -> Json:
         ["packets sent", f"{result.said}"],
         ["differences of the replay", f"{len(result.differences) or 'none'}"],
     ]
-    full_m_s = None if result.companion is None else result.companion.mission_run.full_throttle.m_s
+    full_m_s = None if result.companion is None else result.companion.full_throttle_m_s
     rows += [] if full_m_s is None else [["speed for full throttle, as found", f"{full_m_s:.1f} m/s"]]
     estimate = None if result.companion is None else result.companion.estimate
     rows += [] if estimate is None else [["how it follows velocities", described(estimate)]]

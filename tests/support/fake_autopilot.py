@@ -43,6 +43,7 @@ class FakeAutopilot:
     rival: bool = False
     places_asked: int = 0
     served: int = 0
+    connected: bool = True
     trouble: str = " on a test"
     target_confirmed: bool | None = None
     signing_trouble: str = ""
