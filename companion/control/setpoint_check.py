@@ -40,6 +40,8 @@ SLACK_M = 0.1
 """The controllers look in steps, and let a line end a few centimetres before an obstacle."""
 NEARER_M = 0.05
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
+PASSES_M = 0.04
+"""The same on the way to a position, where guidance lets it come nearer by a tenth of a cell and looks in other steps."""
 STANDS_M_S = 0.05
 PIVOTS_RAD = math.radians(20.0)
 """A standing rover turns on the spot for a position that lies farther aside."""
@@ -71,7 +73,7 @@ def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fa
     if not evidence.base.contains(evidence.base.cell_at(stands)):
         overshoots_m = 0.0  # nothing is known beyond the edge of the map
     way = _way(here, here.bearing_rad(there), 0.0, distance_m + overshoots_m - SLACK_M)
-    clear, seen = along(way, view.rover.radius_m, evidence)
+    clear, seen = along(way, view.rover.radius_m, evidence, deep_m=PASSES_M)
     if clear < len(way):
         return Reason(SetpointFault.BEHIND_OBSTACLE)
     beyond_m = braking_distance_m(settings.min_speed_m_s, settings)

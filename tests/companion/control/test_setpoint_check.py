@@ -291,7 +291,7 @@ def test_a_rover_at_a_wall_may_leave_it() -> None:
     assert fault(Output(GuidedVelocity(0.5, 0.0), Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), evidence) is None
 
 
-@pytest.mark.parametrize(("deep_m", "kind"), [(0.012, None), (0.03, SetpointFault.BEHIND_OBSTACLE)])
+@pytest.mark.parametrize(("deep_m", "kind"), [(0.012, None), (0.03, None), (0.05, SetpointFault.BEHIND_OBSTACLE)])
 def test_a_position_may_lead_past_a_thing_as_near_as_guidance_does(deep_m: float, kind: SetpointFault | None) -> None:
     """Guidance comes nearer than its radius by a tenth of a cell, where it stands beside something already."""
     evidence = open_ground()
