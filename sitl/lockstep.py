@@ -211,6 +211,8 @@ class Drive:
     """Heard by the companion beside its link."""
     lidars: tuple[LidarSpec, ...] = ()
     """On serial ports of the companion; the scenario has the same ones, in this order."""
+    autopilot_on_s: float = 0.0
+    """So long the autopilot is switched on when the companion starts. The first 40 s it only waits, at some cost."""
 
     def __post_init__(self) -> None:
         self.report = Report(self.seed)
@@ -220,6 +222,7 @@ class Drive:
         warm_up(self.settings, self.mission.rover.turning_radius_m)
         self.simulator = self.scenario.simulator(self.seed)
         self.report.compile_time_s = stopwatch_s() - began_s
+        self.simulator.advance_to_s(self.autopilot_on_s)
         self._start_companion()
 
     def _start_companion(self) -> None:

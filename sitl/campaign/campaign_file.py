@@ -95,6 +95,7 @@ class CampaignTable(BaseModel):
     late_s: list[Seconds] = Field(default=[0.0], min_length=1)
     time_limit_s: float = Field(default=1800.0, gt=0.0, le=36000.0)
     person: bool = False
+    autopilot_on_s: float = Field(default=0.0, ge=0.0, le=ARMABLE_S)
     settings: dict[str, dict[str, Any]] = Field(default={SHIPPED: {}}, min_length=1)
     search: SearchTable = SearchTable()
 

@@ -123,8 +123,9 @@ def prepared(spec: RunSpec, folder: Path, recorder: Recorder | NullRecorder | No
     mission, scenario = _mission_and_scenario(spec, folder)
     settings = settings_of(spec)
     return Drive(
-        mission, scenario, settings, spec.seed, recorder or NullRecorder(), spec.time_limit_s, late_s=spec.late_s
-    )
+        mission, scenario, settings, spec.seed, recorder or NullRecorder(), spec.time_limit_s, late_s=spec.late_s,
+        autopilot_on_s=spec.autopilot_on_s,
+    )  # fmt: skip
 
 
 def driven(run: Drive, spec: RunSpec, look: Callable[[], None] = lambda: None) -> tuple[Report, int]:

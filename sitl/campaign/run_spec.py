@@ -38,11 +38,16 @@ class RunSpec:
     """Whether somebody sets GUIDED and arms where the companion waits for that."""
     changes: str
     """The variant's values, as JSON."""
+    autopilot_on_s: float = 0.0
+    """So long the autopilot is switched on when the companion starts."""
 
     @property
     def id(self) -> str:
-        """A short name that no other run has."""
-        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:ID_LENGTH]
+        """A short name that no other run has. A run of before ``autopilot_on_s`` keeps its own."""
+        values = asdict(self)
+        if not self.autopilot_on_s:
+            del values["autopilot_on_s"]
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:ID_LENGTH]
 
     def without(self, axis: str) -> tuple[object, ...]:
         """All values but that of one axis: the same for runs that are a pair."""
@@ -121,5 +126,5 @@ def specs_of(campaign: CampaignTable) -> Iterator[RunSpec]:
             changes = json.dumps(campaign.settings[settings], sort_keys=True)
             yield RunSpec(
                 world, planner, controller, sensors, faults, guard, off_model, late_s, settings, seed,
-                campaign.time_limit_s, campaign.person, changes,
+                campaign.time_limit_s, campaign.person, changes, campaign.autopilot_on_s,
             )  # fmt: skip

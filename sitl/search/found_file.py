@@ -47,6 +47,7 @@ def write_find(find: Find, spec: RunSpec, file: Path, command: str) -> None:
         f"late_s = [{json.dumps(spec.late_s)}]",
         f"time_limit_s = {json.dumps(spec.time_limit_s)}",
         f"person = {json.dumps(spec.person)}",
+        f"autopilot_on_s = {json.dumps(spec.autopilot_on_s)}",
         *_settings(spec),
     ]
     file.parent.mkdir(parents=True, exist_ok=True)

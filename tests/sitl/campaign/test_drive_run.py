@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from companion.executive.mission_progress import TargetStatus
 from sitl.campaign import drive_run
-from sitl.campaign.drive_run import check_spec, drive
+from sitl.campaign.drive_run import check_spec, drive, prepared
 from sitl.campaign.policies import Policy, broken
 from sitl.campaign.run_spec import RunSpec
 from sitl.experiments.time_bound import ways_m
@@ -46,6 +47,17 @@ def test_an_interrupt_within_a_compiled_loop_ends_it(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(drive_run, "prepared", interrupted)
     with pytest.raises(KeyboardInterrupt):
         drive(SPEC, Path())
+
+
+def test_a_companion_that_starts_late_finds_a_ready_autopilot_and_older_runs_keep_their_names(
+    tmp_path: Path,
+) -> None:
+    short = replace(SPEC, world="clutter target_east_m=6")
+    assert SPEC.id == "f017a8929d80" and replace(SPEC, autopilot_on_s=40.0).id != SPEC.id
+    run = prepared(replace(short, autopilot_on_s=40.0), tmp_path)
+    assert run.clock.now_s() == pytest.approx(40.0)
+    report = run.run()
+    assert report.targets[0][1] is TargetStatus.REACHED and len(run.companion.outcome.tick_seconds) < 600
 
 
 def test_where_the_time_went_counts_from_the_first_movement() -> None:
