@@ -255,7 +255,7 @@ class Drive:
     def run(self, observe: Callable[[Status], None] = lambda status: None, every_s: float = TRACK_PERIOD_S) -> Report:
         """Drive until the mission has ended or the time limit is reached; ``observe`` is called every few ticks."""
         began_s = stopwatch_s()
-        next_track_s = next_look_s = 0.0
+        next_track_s = next_look_s = self.simulator.time_s
         with WholeSteps() as steps:  # a record of half a tick would be a damaged one
             while not self.companion.done and self.simulator.time_s < self.time_limit_s:
                 before_s = self.simulator.time_s

@@ -14,12 +14,12 @@ Result = TypeVar("Result")
 
 def apart(parent: int, work: Callable[..., Result], *arguments: object) -> Result:
     """The result of ``work`` in a process that ``parent`` began, and that ends with it."""
-    _end_with(parent)
+    end_with(parent)
     return work(*arguments)
 
 
 @cache
-def _end_with(parent: int) -> None:
+def end_with(parent: int) -> None:
     """Once in each worker. ``parent``: the process that began it; without effect in that process itself."""
     if os.getpid() != parent:
         Thread(target=_watch, args=(parent,), daemon=True).start()

@@ -48,18 +48,20 @@ class FullThrottle:
         """Once a tick. ``full_m_s``: what the autopilot's parameters say."""
         now_s, before_s = view.pose.time_s, self._time_s
         self._time_s = now_s
-        if throttle is None or now_s - throttle.time_s > STALE_S or not _tells(throttle.share, view):
+        led_s = now_s - before_s  # the rover may not have been led meanwhile
+        stale = throttle is None or max(now_s - throttle.time_s, led_s) > STALE_S
+        if throttle is None or stale or not _tells(throttle.share, view):
             self._since_s = math.inf
             return
         changed_m_s, changed_share = abs(view.speed_m_s - self._speed_m_s), abs(throttle.share - self._share)
         if math.isinf(self._since_s) or changed_m_s > SAME_M_S or changed_share > SAME_SHARE:
             self._since_s, self._speed_m_s, self._share = now_s, view.speed_m_s, throttle.share
         elif now_s - self._since_s >= STEADY_S:
-            step_s, seen_m_s = now_s - before_s, view.speed_m_s / throttle.share
-            self._seconds += step_s
-            self._sum_m += step_s * seen_m_s
-            self._slow_s += step_s if seen_m_s < (1.0 - OFF_SHARE) * full_m_s else 0.0
-            self._fast_s += step_s if (1.0 - OFF_SHARE) * seen_m_s > full_m_s else 0.0
+            seen_m_s = view.speed_m_s / throttle.share
+            self._seconds += led_s
+            self._sum_m += led_s * seen_m_s
+            self._slow_s += led_s if seen_m_s < (1.0 - OFF_SHARE) * full_m_s else 0.0
+            self._fast_s += led_s if (1.0 - OFF_SHARE) * seen_m_s > full_m_s else 0.0
 
 
 def _tells(share: float, view: LocalView) -> bool:

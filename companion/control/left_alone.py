@@ -37,8 +37,7 @@ NEARER_M, NEARER_UNSEEN_M = 0.05, 0.1
 cells make ways differ by as much."""
 AWAY_M, AWAY = 0.02, 0.1
 """A rover whose outline lies deeper over something may get so much deeper, so that it gets away; but with each metre it
-must get out of it by the second. On the way to a position a disc may lie as deep over anything: guidance lets one that
-stands beside something come nearer by a tenth of a cell, of 0.2 m or less."""
+must get out of it by the second."""
 UNDER_M, BESIDE = 0.3, 2.0
 """No sensor sees the ground on which the rover can turn and so much round it, nor what lies that many times its half
 width beside it."""
@@ -127,7 +126,7 @@ def turned_on_the_spot(bearing_rad: float, view: LocalView) -> Places:
 
 
 def along(
-    way: NDArray[np.float64], radius_m: float, evidence: EvidenceMap, away: float = AWAY, deep_m: float = AWAY_M
+    way: NDArray[np.float64], radius_m: float, evidence: EvidenceMap, deep_m: float, away: float = AWAY
 ) -> tuple[int, int]:
     """How many places of a way a disc of this radius passes before it lies over something that stands there, over a
     closed field or off the map; and how many before its middle is on unseen ground.

@@ -41,7 +41,8 @@ SLACK_M = 0.1
 NEARER_M = 0.05
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
 PASSES_M = 0.04
-"""The same on the way to a position: guidance comes nearer by a tenth of a cell, and looks in other steps."""
+"""The same on the way to a position: guidance lets a rover that stands beside something come nearer by a tenth of a
+cell, of 0.2 m or less, and looks in other steps."""
 STANDS_M_S = 0.05
 PIVOTS_RAD = math.radians(20.0)
 """A standing rover turns on the spot for a position that lies farther aside."""

@@ -5,6 +5,7 @@ Nouns: notifier, status, outcome.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -30,7 +31,9 @@ FAULT_AFTER_S = 5.0
 """A message rate that is too low for a moment is not told."""
 TICKS_KEPT = 100_000
 """The times of this many of the newest ticks are kept."""
-CRUISE_SET_PERCENT = 75.0
+BACK_S = 2.0
+"""A link that has another end again is told after so long: some end at once."""
+CRUISE_SET_SHARE = 0.75
 """The throttle that is advised, with the speed that belongs to it."""
 SAID_KEPT = 1000
 """This many texts are remembered as said."""
@@ -99,7 +102,7 @@ class Notifier:
         self._slow_since_s: dict[int, float] = {}
         self._faults_told: set[str] = set()
         self._warned: set[str] = set()
-        self._connected, self._scale_told = True, False
+        self._connected, self._cut_s, self._scale_told = True, -math.inf, False
 
     def tell(self, text: str, severity: Severity) -> None:
         """Say it, unless it is what was said last."""
@@ -117,23 +120,25 @@ class Notifier:
             self.tell(text, Severity.WARNING)
 
     def note(self, text: str, severity: Severity) -> None:
-        """Keep a text for the terminal alone, the autopilot's for example."""
+        """Keep a text of the autopilot's for the terminal."""
         self.news.append(News(severity, text, own=False))
 
-    def _tell_link(self) -> None:
-        """That the link is cut, and that it is back: for the terminal alone, as nobody else would hear it."""
-        if self._autopilot.connected == self._connected:
-            return
-        self._connected = self._autopilot.connected
-        if self._connected:
-            self.note(f"the link is back: {self._autopilot.description}", Severity.INFO)
-        else:
-            self.note(f"the link is cut: {self._autopilot.description}; trying again", Severity.WARNING)
+    def _tell_link(self, now_s: float) -> None:
+        """That the link is cut, and that it is back for some time; not over the link, where nobody would hear it."""
+        connected, place = self._autopilot.connected, self._autopilot.description
+        if not connected:
+            self._cut_s = now_s
+        if self._connected and not connected:
+            self.news.append(News(Severity.WARNING, f"The link is cut: {place}"))
+            self._connected = False
+        elif not self._connected and now_s - self._cut_s > BACK_S:
+            self.news.append(News(Severity.INFO, f"The link is back: {place}"))
+            self._connected = True
 
     def tell_faults(self, run: MissionRun, now_s: float, problems: tuple[str, ...]) -> None:
         """Faults that stop nothing, each told once. ``problems``: of the record and the state file."""
         if run.vehicle.heartbeat is not None:
-            self._tell_link()
+            self._tell_link(now_s)
             if self._autopilot.signing_trouble:
                 self.once(self._autopilot.signing_trouble)
         if run.executor is None:
@@ -172,12 +177,12 @@ class Notifier:
 
 def _throttle_text(seen_m_s: float, parameters: Mapping[str, float]) -> str:
     """What to set where the scale of the throttle is far off."""
-    told_m_s, cruise_m_s = full_throttle_m_s(parameters), 0.01 * CRUISE_SET_PERCENT * seen_m_s
+    told_m_s, cruise_m_s = full_throttle_m_s(parameters), CRUISE_SET_SHARE * seen_m_s
     fastest_m_s = parameters.get(FASTEST, 0.0)
-    slower = f", WP_SPEED to {0.9 * seen_m_s:.1f}" if fastest_m_s > seen_m_s else ""
+    slower = f", and WP_SPEED to {0.9 * seen_m_s:.2f}" if fastest_m_s > seen_m_s else ""
     return (
-        f"The rover drives {seen_m_s:.1f} m/s for full throttle, not {told_m_s:.1f} as CRUISE_SPEED and "
-        f"CRUISE_THROTTLE say: on firm ground set them to {cruise_m_s:.1f} and {CRUISE_SET_PERCENT:.0f}{slower}"
+        f"The rover drives {seen_m_s:.2f} m/s at full throttle, not {told_m_s:.2f} as CRUISE_SPEED and CRUISE_THROTTLE "
+        f"say: if this ground is firm, set them to {cruise_m_s:.2f} and {100 * CRUISE_SET_SHARE:.0f}{slower}"
     )
 
 

@@ -139,7 +139,7 @@ def _figures(run: Run) -> Json:
         ["differences of the replay", f"{len(result.differences) or 'none'}"],
     ]
     full_m_s = None if result.companion is None else result.companion.full_throttle_m_s
-    rows += [] if full_m_s is None else [["speed for full throttle, as found", f"{full_m_s:.1f} m/s"]]
+    rows += [] if full_m_s is None else [["speed at full throttle, as found", f"{full_m_s:.1f} m/s"]]
     estimate = None if result.companion is None else result.companion.estimate
     rows += [] if estimate is None else [["how it follows velocities", described(estimate)]]
     return {"title": "The run", "head": ["", ""], "rows": rows}

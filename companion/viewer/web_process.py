@@ -217,7 +217,7 @@ class WebProcess:
     def _feed(self) -> None:
         """One process, from its start to its end. Raises OSError when its pipe breaks, or nothing is taken from it."""
         descriptor = self._socket.fileno()
-        command = [sys.executable, "-m", "companion.viewer.server", str(descriptor)]
+        command = [sys.executable, "-P", "-m", "companion.viewer.server", str(descriptor)]
         process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, pass_fds=(descriptor,),
             start_new_session=True, pipesize=PIPE_BYTES,

@@ -10,8 +10,8 @@ from itertools import repeat
 
 from matplotlib.figure import Figure
 
-SERVED = '<html class="served"'
-"""How a page begins whose links somebody answers; in a file they are plain text."""
+IN_FILES, SERVED = ("<html ", 'data-run="'), ('<html class="served" ', 'target="_blank" href="/replay/')
+"""What makes links of the runs of a page, where somebody answers them; in a file they are plain text."""
 WIDE_LETTERS = 30
 """Longer words of a column are wrapped."""
 STYLE = """
@@ -38,7 +38,6 @@ th[aria-sort=descending]::after { content: " ▼"; }
 figure { margin: 1rem 0; background: #fff; padding: .5rem; display: inline-block; max-width: 100%; }
 img { max-width: 100%; height: auto; } figcaption { color: #444; font-size: .9em; }
 code { font-size: .85em; background: var(--soft); padding: .1rem .3rem; user-select: all; }
-html:not(.served) .replay { color: inherit; text-decoration: none; pointer-events: none; }
 html:not(.served) .replays { display: none; }
 """
 
@@ -81,7 +80,7 @@ def table(
         if number in code:
             inside = f"<code>{inside}</code>"
         if run and number == linked:
-            inside = f'<a class="replay" href="/replay/{run}" target="_blank">{inside}</a>'
+            inside = f'<a class="replay" data-run="{run}">{inside}</a>'
         return f'<td class="{kind(number)}">{inside}</td>'
 
     top = "".join(
@@ -92,6 +91,13 @@ def table(
         for line, run in zip(lines, runs or repeat(""), strict=False)
     )
     return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def served(page: str) -> str:
+    """The same page with links at its runs."""
+    for here, there in zip(IN_FILES, SERVED, strict=True):
+        page = page.replace(here, there)
+    return page
 
 
 def picture(figure: Figure, what: str) -> str:

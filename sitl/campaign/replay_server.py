@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import html
+import os
 import shutil
 import subprocess
 import sys
@@ -18,9 +19,10 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Lock, Thread
+from typing import Any
 
 from companion.core.clock import stopwatch_s
-from sitl.campaign.page_parts import SERVED, document
+from sitl.campaign.page_parts import document, served
 
 HOST, HERE = "127.0.0.1", ("127.0.0.1", "localhost")
 AGAIN_S = 1
@@ -50,9 +52,9 @@ class Replay:
 
 @dataclass
 class _State:
-    """How far a replay is. ``fault``: why there is no record; ``said``: what the program said at its end."""
+    """How far a replay is. ``began_s``: None while it waits for another one. ``fault``: why there is no record."""
 
-    began_s: float
+    began_s: float | None = None
     done: bool = False
     fault: str = ""
 
@@ -77,10 +79,10 @@ class Replays:
     def state(self, run_id: str) -> _State:
         """Begin it if it has not begun; one that has failed begins anew after it was told once."""
         with self._lock:
-            state = self._states.get(run_id)
-            if state is None:
-                state = self._states[run_id] = _State(stopwatch_s(), done=self.report_of(run_id).exists())
-                if not state.done:
+            state, there = self._states.get(run_id), self.report_of(run_id).exists()
+            if state is None or (state.done and not state.fault and not there):
+                state = self._states[run_id] = _State(done=there)
+                if not there:
                     Thread(target=self._drive, args=(run_id, state), daemon=True).start()
             elif state.fault:
                 del self._states[run_id]
@@ -98,11 +100,12 @@ class Replays:
         place = self.report_of(run_id).parent
         try:
             with self._turn:
+                state.began_s = stopwatch_s()
                 shutil.rmtree(place, ignore_errors=True)  # what an end before the time has left
                 self._done([PROGRAM, *self.by_id[run_id].command, "--record", str(place)])
                 self._done([REPORTER, "report", str(place)])
-        except (OSError, ServeError) as error:
-            state.fault = f"{error}"
+        except Exception as error:  # whatever it is, the page that waits must end
+            state.fault = f"{error}" or type(error).__name__
         state.done = True
 
     def _done(self, command: Sequence[str]) -> None:
@@ -117,11 +120,14 @@ class Replays:
 
 
 def program(command: Sequence[str]) -> subprocess.Popen[str]:
-    """A program of this project, begun in this folder. ``command``: its module, and what it is told."""
+    """A program of this project, begun in this folder. ``command``: its module, and what it is told.
+
+    It ends with this process, however that ends, and what lies in the folder takes the place of no module.
+    """
     module, *arguments = command
-    started = f"from {module} import main; main()"
+    started = f"from sitl.worker_end import end_with; end_with({os.getpid()}); from {module} import main; main()"
     return subprocess.Popen(
-        [sys.executable, "-c", started, *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+        [sys.executable, "-P", "-c", started, *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True,
     )  # fmt: skip
 
@@ -132,10 +138,9 @@ class ReplayServer:
     def __init__(self, port: int) -> None:
         """``port``: 0 for any that is free. Raises ServeError when it cannot be used."""
         try:
-            self._http = ThreadingHTTPServer((HOST, port), _Handler)
+            self._http = _Http((HOST, port), _Handler)
         except OSError as error:
             raise ServeError(f"--serve {port}: {error.strerror or error}; choose another port") from error
-        self._http.daemon_threads = True
 
     @property
     def url(self) -> str:
@@ -159,6 +164,17 @@ class ReplayServer:
         self._http.server_close()
 
 
+class _Http(ThreadingHTTPServer):
+    """A thread a request; says nothing of a browser that has gone."""
+
+    daemon_threads = True
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """See ``BaseServer``."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
+
 class _Handler(BaseHTTPRequestHandler):
     """One request. ``/``: the report; ``/replay/ID``: its run; ``/record/ID``: the report of its record."""
 
@@ -167,17 +183,25 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer it."""
-        host = self.headers.get("Host", "").rpartition(":")[0]
-        if host not in HERE:  # a page of elsewhere whose name was made to lead here
+        host = self.headers.get("Host", "").partition(":")[0].lower()
+        # Not for a page of elsewhere, also one whose name was made to lead here.
+        if host not in HERE or self.headers.get("Sec-Fetch-Site") == "cross-site":
             return self._answer(HTTPStatus.FORBIDDEN, "only this machine is answered")
         kind, _, run_id = self.path.strip("/").partition("/")
         if not kind:
-            return self._page(SERVED.join(self.report.read_text(encoding="utf-8").split("<html", 1)))
+            return self._file(self.report, served)
         if kind not in ("replay", "record") or run_id not in self.replays.by_id:
             return self._answer(HTTPStatus.NOT_FOUND, "there is no such page")
         if kind == "record" and (file := self.replays.report_of(run_id)).exists():
-            return self._page(file.read_text(encoding="utf-8"))
+            return self._file(file)
         return self._replay(run_id)
+
+    def _file(self, file: Path, changed: Callable[[str], str] = str) -> None:
+        try:
+            text = changed(file.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            return self._answer(HTTPStatus.NOT_FOUND, f"{file}: cannot be read: {error}")
+        return self._page(text)
 
     def _replay(self, run_id: str) -> None:
         state, what = self.replays.state(run_id), html.escape(self.replays.by_id[run_id].what)
@@ -189,9 +213,10 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header("Location", f"/record/{run_id}")
             self.send_header("Content-Length", "0")
             return self.end_headers()
-        text = (
-            f"This run is driven again, and shown here when it is done. {stopwatch_s() - state.began_s:.0f} s so far."
-        )
+        text = "This run is driven again as soon as another one is done."
+        if state.began_s is not None:
+            seconds = stopwatch_s() - state.began_s
+            text = f"This run is driven again, and shown here when it is done. {seconds:.0f} s so far."
         return self._page(document(run_id, [f"<h1>{what}</h1><p>{text}</p>"]), again=True)
 
     def _page(self, text: str, *, again: bool = False) -> None:

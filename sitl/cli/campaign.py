@@ -97,7 +97,7 @@ def campaign(
     """Drive every run of CAMPAIGN: worlds x planners x controllers x sensors x faults x settings x seeds.
 
     Exit code 2: bad input; 3: a run ended with an error of the programs; 130: stopped, what is done is kept
-    and reported.
+    and reported (not while the report is served).
     """
     try:
         _check_together(
@@ -113,7 +113,7 @@ def campaign(
                 "--serve": serve is not None,
             }
         )
-        server = None if serve is None else ReplayServer(serve)
+        server = None if serve is None else _server(serve)
         if replay is not None or record is not None:
             _drive_again(file, replay, record, search, out)
         elif search is not None:
@@ -123,6 +123,13 @@ def campaign(
     except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
+
+
+def _server(port: int) -> ReplayServer:
+    """Raises ServeError."""
+    server = ReplayServer(port)
+    typer.echo(f"--serve: {server.url} answers when all runs are done", err=True)
+    return server
 
 
 def _check_together(given: Mapping[str, bool]) -> None:

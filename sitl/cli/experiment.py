@@ -26,6 +26,7 @@ from sitl.experiments.experiment import (
     ExperimentError,
     ExperimentReport,
     Options,
+    unknown,
 )
 
 WITH_STATISTICS = ("barn", "gates", "killed-companion", "traffic", "wang-table4")
@@ -100,7 +101,7 @@ def _console() -> Console:
 def _check(name: str, json_file: Path | None, docs: Path | None) -> None:
     """Before the work, not after it: a name, a library or a place that is not there."""
     if name not in given.EXPERIMENTS:
-        raise ExperimentError(f"experiment {name}: unknown; known are {', '.join(given.EXPERIMENTS)}")
+        raise unknown("experiment", name, given.EXPERIMENTS)
     if name in WITH_STATISTICS and (fault := statistics_fault(f"experiment {name}")):
         raise ExperimentError(fault)
     writable(json_file)

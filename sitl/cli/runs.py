@@ -58,14 +58,14 @@ def warm_up_all(left: list[RunSpec], folder: Path) -> None:
 
 
 @contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
-    """Nobody else drives a campaign into this folder meanwhile. Raises CampaignError."""
+def alone_in(folder: Path, otherwise: str = "another campaign writes its runs here") -> Iterator[None]:
+    """Nobody else works in this folder meanwhile. Raises CampaignError, with who it is ``otherwise``."""
     held = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield
     except BlockingIOError:
-        text = f"{folder}: another campaign writes its runs here; wait for its end, or choose another folder with --out"
+        text = f"{folder}: {otherwise}; wait for its end, or choose another folder with --out"
         raise CampaignError(text) from None
     finally:
         os.close(held)

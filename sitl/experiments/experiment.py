@@ -132,7 +132,7 @@ class Options:
 
 def unknown(option: str, name: str, known: Iterable[str], more: str = "") -> ExperimentError:
     """The error for a name of a list that nobody knows. ``more``: said after those that are known."""
-    near = alike(name, known := tuple(known))
+    near = alike(name, known := tuple(map(str, known)))
     hint = f", did you mean {near!r}?" if near else ";"
     return ExperimentError(f"{option}: {name!r:.60} is unknown{hint} known: {', '.join(known)}{more}")
 

@@ -57,6 +57,13 @@ def test_little_turning_standing_changing_or_stale_driving_does_not() -> None:
     assert driven(*[(0.5, 1.0, 0.8), (0.5, 0.5, 1.6)] * 60).m_s is None
 
 
+def test_what_was_between_two_times_that_it_was_led_does_not_count() -> None:
+    found = driven((2.0, 1.0, 0.8))
+    later = replace(HERE, pose=Pose(0.0, 0.0, 0.0, 100.0), speed_m_s=0.8)
+    found.note(ThrottleSeen(100.0, 1.0), FULL_M_S, later)
+    assert found.m_s is None and not found.doubted
+
+
 @pytest.mark.parametrize(
     ("parts", "doubted"),
     [
@@ -75,7 +82,7 @@ def test_the_scale_is_doubted_where_it_is_mostly_far_off(
 
 @pytest.mark.parametrize(
     ("fastest_m_s", "says"),
-    [(2.0, "say: on firm ground set them to 0.6 and 75, WP_SPEED to 0.7"), (0.5, "set them to 0.6 and 75")],
+    [(2.0, "set them to 0.60 and 75, and WP_SPEED to 0.72"), (0.5, "set them to 0.60 and 75")],
 )
 def test_what_to_set_is_told_once(fastest_m_s: float, says: str) -> None:
     one, _ = notifier()
@@ -87,7 +94,7 @@ def test_what_to_set_is_told_once(fastest_m_s: float, says: str) -> None:
         one.tell_faults(run, now_s, ())
         found.m_s += 0.1
     (text,) = one.said
-    assert text.startswith("The rover drives 0.8 m/s for full throttle, not 4.0") and text.endswith(says)
+    assert text.startswith("The rover drives 0.80 m/s at full throttle, not 4.00") and text.endswith(says)
 
 
 def test_a_weak_rover_is_told_on_a_real_drive() -> None:
@@ -96,4 +103,4 @@ def test_a_weak_rover_is_told_on_a_real_drive() -> None:
     run = Drive(mission, scenario, Settings(), 1, NullRecorder(), time_limit_s=90.0)
     report = run.run()
     assert run.companion.mission_run.full_throttle.m_s == pytest.approx(1.2, abs=0.05)
-    assert sum("1.2 m/s for full throttle, not 4.0" in text for text in report.said) == 1
+    assert sum("m/s at full throttle, not 4.00" in text for text in report.said) == 1

@@ -44,7 +44,7 @@ def test_it_tells_how_the_rover_followed_velocities() -> None:
     estimate = ModelEstimate(AS_SHIPPED, AS_SHIPPED)
     result.companion = cast(Any, SimpleNamespace(estimate=estimate, full_throttle_m_s=1.234))
     full, told = _figures(Run("a", "Yard", RunTally(), result, None))["rows"][-2:]
-    assert full == ["speed for full throttle, as found", "1.2 m/s"]
+    assert full == ["speed at full throttle, as found", "1.2 m/s"]
     assert told[0] == "how it follows velocities" and told[1].startswith("after 0.30 s, gains 1.00 and loses 1.00 m/s")
 
 

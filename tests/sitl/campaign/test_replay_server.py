@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 import time
@@ -15,7 +17,8 @@ import pytest
 
 from sitl.campaign.page_parts import document
 from sitl.campaign.replay_server import Replay, Replays, ReplayServer, ServeError
-from tests.support.served import PATIENCE_S
+from tests.support.records import MISSIONS
+from tests.support.served import PATIENCE_S, wait_until
 
 DRIVE = "import pathlib, sys; pathlib.Path(sys.argv[1]).mkdir(parents=True)"
 REPORT = "import pathlib, sys; (pathlib.Path(sys.argv[1]) / 'report.html').write_text('<html>the drive</html>')"
@@ -103,6 +106,17 @@ def test_a_report_that_is_there_is_not_made_again_and_a_torn_record_is(served: S
     assert served.programs.begun == ["--replay two --record", "report"]
 
 
+def test_a_record_that_was_deleted_is_made_again_and_a_report_that_is_gone_is_told(
+    served: Served, tmp_path: Path
+) -> None:
+    served.until("replay/one", "the drive")
+    shutil.rmtree(tmp_path / "replays" / "one-digest")
+    served.until("replay/one", "the drive")
+    assert served.programs.begun.count("report") == 2
+    (tmp_path / "report.html").unlink()
+    assert "report.html: cannot be read" in served.get("")[1]
+
+
 def test_a_run_that_fails_says_why_and_may_be_tried_again(served: Served) -> None:
     assert "exit code 1: no such seed" in served.until("replay/bad", "could not be")
     served.programs.wrong = False
@@ -110,7 +124,13 @@ def test_a_run_that_fails_says_why_and_may_be_tried_again(served: Served) -> Non
 
 
 def test_nobody_else_and_nothing_else_is_answered(served: Served) -> None:
-    assert served.get("", host="elsewhere.example:80")[0] == 403
+    for host, status in (
+        ("elsewhere.example:80", 403),
+        ("localhost", 200),
+        ("127.0.0.1", 200),
+        ("LOCALHOST:8000", 200),
+    ):
+        assert served.get("", host)[0] == status
     for path in ("replay/three", "record/..", "replay/../../secret", "elsewhere"):
         assert served.get(path)[0] == 404, path
     assert served.programs.begun == []
@@ -120,6 +140,24 @@ def test_a_port_that_is_taken_is_told(served: Served) -> None:
     port = int(served.server.url.rpartition(":")[2].strip("/"))
     with pytest.raises(ServeError, match=f"--serve {port}: .*choose another port"):
         ReplayServer(port)
+
+
+@pytest.mark.thorough
+def test_a_program_ends_with_a_server_that_is_killed(tmp_path: Path) -> None:
+    (tmp_path / "html.py").write_text("raise SystemExit(9)")  # takes the place of no module of Python's
+    code = (
+        "from sitl.campaign.replay_server import program\n"
+        f"one = program(['sitl.cli.main', 'serve', {str(MISSIONS / 'open.toml')!r}, '--listen', 'tcp:127.0.0.1:0'])\n"
+        "print(one.pid, flush=True)\none.communicate()"
+    )
+    parent = subprocess.Popen([sys.executable, "-P", "-c", code], stdout=subprocess.PIPE, cwd=tmp_path)
+    with parent:
+        assert parent.stdout is not None
+        child = int(parent.stdout.readline())
+        time.sleep(2.0)
+        os.kill(child, 0)
+        parent.kill()
+    wait_until(lambda: not Path(f"/proc/{child}").exists())
 
 
 def test_what_is_being_driven_ends_with_the_server(tmp_path: Path) -> None:
