@@ -21,7 +21,7 @@ from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.following import GUARDED_S, SOON_S, Following, alone_s, turn_gains
 from companion.control.last_command_kernels import admitted_speeds, braking_spares_m, may_be_last
 from companion.control.local_view import LocalView
-from companion.control.motion_ground import NEAR_M, Window, look_round, unseen_to_m
+from companion.control.motion_ground import NEAR_M, Window, comes_from_m, look_round
 from companion.control.motion_kernels import (
     Body,
     MotionProblem,
@@ -222,7 +222,7 @@ class MotionController:
     def _problem(self, path: ReferencePath, view: LocalView, model: RoverModel) -> MotionProblem:
         now_s, pose = view.pose.time_s, view.pose
         if self._window is None or view.scans != self._looked_scans or now_s - self._looked_s >= LOOKS_S:
-            came_here = self._came_m > 2.0 * unseen_to_m(self._body, came_here=True)
+            came_here = self._came_m > comes_from_m(self._body)
             self._window = look_round(
                 view.evidence, pose.point, path, self._body, model.fastest_m_s,
                 stops_at=_stops_at(view, model), came_here=came_here,

@@ -41,12 +41,15 @@ NEAR_M = 0.3
 """A rover that stands too near to something finds its way from so far away."""
 NEARER_M = 1.0
 """A path that is closed farther ahead is followed at least so far, or it counts as closed here."""
-UNDER_M, BESIDE = 0.1, 2.0
-"""Round the rover ground counts as seen: so much beyond what it can turn on, and to so many times its half width. A
-lidar that looks 60 degrees wide sees the ground beside the rover's way only from there on."""
+UNDER_M = 0.1
+"""Round a rover that came from elsewhere with open eyes ground counts as seen, so much beyond what it can turn on. It
+saw what is farther aside before it came beside it, or something hides it: the end of a wall, seen from neither side."""
 BESIDE_FIRST, UNDER_FIRST_M = 1.42, 0.05
-"""Less where it has not come from elsewhere under this program: of what is beside it nothing was seen on the way. So
+"""Round one that begins, or begins anew, to so many times its half width, or so much beyond what it can turn on. So
 much a lidar of 90 degrees needs to drive on; with a narrower one the rover turns first."""
+COMES_M, COMES = 0.2, 4.0
+"""It came from elsewhere after so much more than twice what it can turn on, or so many times its half width: with a
+lidar that looks 60 degrees wide it has passed by then what is beside it where it begins."""
 COARSE = 2
 """Evidence cells along the side of a cell that has a time to go."""
 
@@ -176,8 +179,13 @@ def _closed(
 def unseen_to_m(body: Body, came_here: bool) -> float:
     """So far from the rover's place ground counts as seen that no sensor saw. ``came_here``: see ``look_round``."""
     if came_here:
-        return max(body.around_m, BESIDE * body.radius_m) + UNDER_M
+        return body.around_m + UNDER_M
     return max(body.around_m, BESIDE_FIRST * body.radius_m) + UNDER_FIRST_M
+
+
+def comes_from_m(body: Body) -> float:
+    """After so long a way forwards a rover has come from elsewhere: see ``look_round``."""
+    return max(2.0 * body.around_m, COMES * body.radius_m) + COMES_M
 
 
 def _under(
