@@ -1,4 +1,4 @@
-"""A lidar that looks 60 or 90 degrees wide sees the ends of walls late, or never: planned motions keep clear of them."""
+"""A lidar that looks 60 or 90 degrees wide may never see the end of a wall: planned motions keep clear of it."""
 
 from __future__ import annotations
 
