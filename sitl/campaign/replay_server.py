@@ -22,6 +22,7 @@ from threading import Lock, Thread
 from typing import Any
 
 from companion.core.clock import stopwatch_s
+from companion.storage.files import read_at_most
 from sitl.campaign.page_parts import document, served
 
 HOST, HERE = "127.0.0.1", ("127.0.0.1", "localhost")
@@ -29,6 +30,8 @@ AGAIN_S = 1
 """So often a page that waits looks again."""
 REPORT = "report.html"
 PROGRAM, REPORTER = "sitl.cli.main", "companion.cli.main"
+MOST_BYTES = 500_000_000
+"""Of a report."""
 MOST_WORDS = 500
 """Letters of an error that are shown."""
 
@@ -198,7 +201,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _file(self, file: Path, changed: Callable[[str], str] = str) -> None:
         try:
-            text = changed(file.read_text(encoding="utf-8"))
+            text = changed(read_at_most(file, MOST_BYTES).decode())
         except (OSError, UnicodeDecodeError) as error:
             return self._answer(HTTPStatus.NOT_FOUND, f"{file}: cannot be read: {error}")
         return self._page(text)

@@ -44,6 +44,7 @@ class FakeAutopilot:
     places_asked: int = 0
     served: int = 0
     connected: bool = True
+    description: str = "a test"
     trouble: str = " on a test"
     target_confirmed: bool | None = None
     signing_trouble: str = ""
