@@ -50,6 +50,7 @@ def experiment(
     setups: given.Setups = None,
     lidar: given.Lidar = None,
     missions: given.Missions = None,
+    sensors: given.Sensors = None,
     guard: given.Guard = False,
     off: given.Off = OFF_MODEL,
     late: given.Late = 0.0,
@@ -71,8 +72,8 @@ def experiment(
         options = Options(
             runs, seed, jobs, maps, tuple(world or ()), given.names_given("--planners", planners), worlds,
             given.names_given("--controllers", controllers), given.names_given("--setups", setups), lidar, guard, off,
-            late, guid_timeout, keep, given.names_given("--missions", missions), given.outline_m(outline),
-            turning_radius,
+            late, guid_timeout, keep, given.names_given("--missions", missions),
+            given.names_given("--sensors", sensors), given.outline_m(outline), turning_radius,
         )  # fmt: skip
         given.refuse_unused(name, options)
         _check_keep(keep)

@@ -41,6 +41,7 @@ TAKERS = {
     "--setups": ("barn", "gates"),
     "--lidar": ("barn",),
     "--missions": ("dead-companion", "missions"),
+    "--sensors": ("missions",),
     "--guard": GUARDED,
     "--off": MISMATCHED,
     "--late": ("barn", "controllers", "gates", "killed-companion", "missions"),
@@ -128,6 +129,10 @@ Missions = Annotated[
     str | None,
     typer.Option(help=f"{_of('--missions')}: names of shipped missions, separated by commas; default: all."),
 ]
+Sensors = Annotated[
+    str | None,
+    typer.Option(help="missions: suites of sensors, separated by commas; default: lidar-90,lidar-360,beams."),
+]
 Guard = Annotated[bool, typer.Option("--guard", help=f"{_of('--guard')}: with the guard on the autopilot.")]
 Off = Annotated[
     float,
@@ -206,6 +211,7 @@ def refuse_unused(name: str, options: Options) -> None:
         "--setups": options.setups,
         "--lidar": options.lidar is not None,
         "--missions": options.missions,
+        "--sensors": options.sensors,
         "--guard": options.guard,
         "--off": options.off != OFF_MODEL,
         "--late": options.late_s,

@@ -85,6 +85,8 @@ class Options:
     """The folder in which the results of single runs are kept; None: nowhere."""
     missions: tuple[str, ...] = ()
     """Which of those that ship with the project; none: all."""
+    sensors: tuple[str, ...] = ()
+    """``missions``: with which suites of sensors; none: all three."""
     outline_m: tuple[float, float] | None = None
     """``gates``: length and width of the rover; None: the experiment's own."""
     turning_radius_m: float = 0.0
@@ -95,6 +97,7 @@ class Options:
         chosen = f" --planners {','.join(self.planners)}" if self.planners else ""
         chosen += f" --controllers {','.join(self.controllers)}" if self.controllers else ""
         chosen += f" --missions {','.join(self.missions)}" if self.missions else ""
+        chosen += f" --sensors {','.join(self.sensors)}" if self.sensors else ""
         chosen += f" --setups {','.join(self.setups)}" if self.setups else ""
         chosen += f" --lidar {self.lidar}" if self.lidar else ""
         chosen += " --guard" if self.guard else ""

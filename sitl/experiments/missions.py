@@ -23,6 +23,7 @@ from sitl.experiments.experiment import (
     Options,
     chosen_controllers,
     each,
+    unknown,
 )
 from sitl.experiments.intervals import mean_interval
 from sitl.experiments.off_model import scenario_off_model, taken_for
@@ -101,7 +102,7 @@ class MissionsReport(ExperimentReport):
 
     def tables(self) -> list[Table]:
         """One for each suite of sensors."""
-        return [terminal_table(f"{NAME}: {suite}", HEAD, self._rows(suite)) for suite in SUITES]
+        return [terminal_table(f"{NAME}: {suite}", HEAD, self._rows(suite)) for suite in _suites(self.options)]
 
     def as_json(self) -> dict[str, object]:
         """Every drive."""
@@ -116,7 +117,8 @@ class MissionsReport(ExperimentReport):
 
     def section(self) -> str:
         """See ``ExperimentReport``."""
-        tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in SUITES)
+        suites = _suites(self.options)
+        tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in suites)
         guard = ", with the guard on the autopilot" if self.options.guard else ""
         first, after = self.options.seed, self.options.seed + self.options.runs
         later = f", seeds {first} to {after - 1}" if first else ""
@@ -143,13 +145,21 @@ def _row(mission: str, controller: str, drives: Iterable[MissionDrive]) -> list[
     return [mission, controller, f"{len(own)}", *map(str, counts), f"{np.mean(times_s):.1f}", spread]
 
 
+def _suites(options: Options) -> list[str]:
+    """The suites of sensors that were asked for, or all. Raises ExperimentError for one that does not exist."""
+    for name in options.sensors:
+        if name not in SUITES:
+            raise unknown("--sensors", name, SUITES)
+    return [suite for suite in SUITES if suite in (options.sensors or SUITES)]
+
+
 def run(options: Options, advance: Advance) -> MissionsReport:
     """Every mission, suite, controller and seed."""
     tasks = [
         (with_suite(mission, suite), controller, seed, options.guard, options.off, options.late_s, options.timeout_s)
         for controller in chosen_controllers(options, (POINTS,))
         for mission in shipped(options)
-        for suite in SUITES
+        for suite in _suites(options)
         for seed in range(options.seed, options.seed + options.runs)
     ]
     drives: list[MissionDrive] = []

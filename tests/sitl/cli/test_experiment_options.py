@@ -36,7 +36,7 @@ def test_there_are_no_more_runs_than_in_a_campaign(runs: str, bound: str) -> Non
 
 
 @pytest.mark.parametrize("listed", ["", " , "])
-@pytest.mark.parametrize("option", ["--planners", "--controllers", "--setups", "--missions"])
+@pytest.mark.parametrize("option", ["--planners", "--controllers", "--setups", "--missions", "--sensors"])
 def test_a_list_that_names_nothing_does_not_mean_all(option: str, listed: str) -> None:
     said = refused("soak", "--runs", "1", option, listed)
     assert said == f"{option} {listed!r}: names nothing; separate names by commas\n"

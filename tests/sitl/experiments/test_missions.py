@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from companion.mission.load import load_mission
+from sitl.experiments import missions
 from sitl.experiments.dead_companion import shipped, with_suite
 from sitl.experiments.experiment import ExperimentError, Options
 from sitl.experiments.missions import NO_WAY, MissionDrive, MissionsReport, drive
@@ -24,6 +25,14 @@ def test_a_drive_says_who_led_it() -> None:
     one = drive(mission, "motion-ga", 0, guarded=True)
     assert (one.mission, one.suite, one.controller) == (mission.name, "lidar-90", "motion-ga")
     assert (one.touched, one.run_into, one.refused, one.missed) == (0, 0, 0, 0) and 10.0 < one.seconds < 200.0
+
+
+@pytest.mark.thorough
+def test_single_beams_lead_the_same_way_with_a_guard_and_without() -> None:
+    """Positions end by themselves: strict missions of many seeds need no drives of their own with beams."""
+    mission = with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "beams")
+    guarded, strict = (drive(mission, "motion-ga", 5, guarded=guarded) for guarded in (True, False))
+    assert guarded == strict and guarded.controller == "points"
 
 
 @pytest.mark.thorough
@@ -53,6 +62,23 @@ def test_some_missions_can_be_chosen_by_their_files() -> None:
     assert "--missions depot,field.plan" in Options(missions=("depot", "field.plan")).command("missions")
     with pytest.raises(ExperimentError, match="--missions: 'hill' is unknown; known: open, one-obstacle"):
         shipped(Options(missions=("hill",)))
+
+
+def test_some_suites_of_sensors_can_be_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
+    driven: list[tuple[object, ...]] = []
+
+    def each(jobs: int, work: object, tasks: list[tuple[object, ...]], keep: object) -> list[MissionDrive]:
+        driven.extend(tasks)
+        return [MissionDrive("Rooms", str(task[0].sitl.sensors), "points", 0, 0, 0, 0, 0, 9.0) for task in tasks]  # type: ignore[attr-defined]
+
+    monkeypatch.setattr(missions, "each", each)
+    options = Options(1, missions=("rooms",), sensors=("beams", "lidar-90"))
+    report = missions.run(options, lambda done, of: None)
+    assert [one.suite for one in report.drives] == ["lidar-90", "beams"] and len(driven) == 2
+    assert "`beams`:" in report.section() and "`lidar-360`:" not in report.section() and len(report.tables()) == 2
+    assert "--missions rooms --sensors beams,lidar-90" in report.section()
+    with pytest.raises(ExperimentError, match="--sensors: 'beam' is unknown, did you mean 'beams'"):
+        missions.run(Options(1, sensors=("beam",)), lambda done, of: None)
 
 
 def test_the_table_counts_each_mission_and_all() -> None:
