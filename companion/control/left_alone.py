@@ -187,11 +187,12 @@ def _obeys_s(view: LocalView) -> tuple[float, ...]:
 def _tells(setpoint: GuidedVelocity, view: LocalView, obeys_s: float) -> NDArray[np.float64]:
     """From when on which speed and turn rate have their effect, one a row; the last one is the setpoint's.
 
-    Where no velocity was told, the rover goes on as it does; a position tells it to drive on.
+    Where no velocity was told, the rover goes on as it does; a position tells it to drive on, as fast as was told with
+    it: on a leg with a speed of its own that is another one than the mission's.
     """
     now_s, on_m_s = view.pose.time_s, view.forward_m_s
     if view.by_position(now_s - obeys_s):
-        on_m_s = view.rover.cruise_speed_m_s
+        on_m_s = view.placed_m_s if math.isfinite(view.placed_m_s) else view.rover.cruise_speed_m_s
     first = in_force(view.lately, now_s - obeys_s)
     rows = [(-math.inf, on_m_s, view.yaw_rate_rad_s) if first is None else (-math.inf, *first[1:])]
     later = (one for one in view.lately if one.time_s > now_s - obeys_s)

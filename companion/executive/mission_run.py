@@ -227,7 +227,8 @@ class MissionRun:
         self.full_throttle.note(self.vehicle.throttle, full_m_s, view)
         held_m_s = self._drag.held_m_s(self.vehicle.throttle, full_m_s, view)
         view = changed(view, held_m_s=held_m_s, dragged_m_s=self._drag.dragged_m_s(), lately_held=self._drag.closes())
-        view = changed(view, told=told, lately=self._lately, placed_s=self._placed_s)
+        placed_m_s = self.sender.placed_m_s
+        view = changed(view, told=told, lately=self._lately, placed_s=self._placed_s, placed_m_s=placed_m_s)
         if not self._drag.misleads():
             executor.learn(view)
         wanted = executor.guide(task, view)

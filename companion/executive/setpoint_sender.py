@@ -35,8 +35,14 @@ class SentSetpoints:
         """Forget what was sent: the next setpoint goes out at once."""
         self._setpoint: Setpoint | None = None
         self._setpoint_s = -math.inf
-        self._speed_m_s = math.nan
+        self._speed_m_s = self._speed_before_m_s = math.nan
         self._speed_s = -math.inf
+
+    @property
+    def placed_m_s(self) -> float:
+        """How fast the autopilot drives to positions at most, as told last and before; inf until both are known."""
+        speeds_m_s = (self._speed_m_s, self._speed_before_m_s)
+        return math.inf if any(map(math.isnan, speeds_m_s)) else max(speeds_m_s)
 
     def due(
         self,
@@ -57,7 +63,7 @@ class SentSetpoints:
             self._setpoint, self._setpoint_s = wanted.setpoint, now_s
         if isinstance(wanted.setpoint, GuidedPosition) and self._speed_is_due(wanted.speed_m_s, now_s):
             commands.append(ChangeSpeed(round(wanted.speed_m_s, 2)))
-            self._speed_m_s, self._speed_s = wanted.speed_m_s, now_s
+            self._speed_before_m_s, self._speed_m_s, self._speed_s = self._speed_m_s, wanted.speed_m_s, now_s
         return commands
 
     def _is_due(
@@ -91,6 +97,11 @@ class SetpointSender:
         self._settings = settings
         self._notifier = notifier
         self._sent = SentSetpoints()
+
+    @property
+    def placed_m_s(self) -> float:
+        """See ``SentSetpoints.placed_m_s``."""
+        return self._sent.placed_m_s
 
     def reset(self) -> None:
         """Forget what was sent: the next setpoint goes out at once."""

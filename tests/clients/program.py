@@ -19,6 +19,9 @@ import pytest
 from tests.support.forked import Forked
 from tests.support.served import PATIENCE_S
 
+AGAIN_S = 1.0
+"""After so long a client asks again for what a busy computer did not do in time."""
+
 
 def installed(module: str, package: str) -> None:
     """A client that is missing is a failure: the extra ``test`` installs it."""
@@ -66,10 +69,16 @@ class Program:
         self.child.stdin.write(f"{line}\n".encode())
         self.child.stdin.flush()
 
-    def told(self, line: str, answer: str) -> re.Match[str]:
-        """Type a line and wait for what it answers."""
-        self.tell(line)
-        return self.says(answer)
+    def told(self, line: str, answer: str, again: str = "(?!)") -> re.Match[str]:
+        """Type a line and wait for what it answers; where that is ``again``, once more, as a person would."""
+        stop_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < stop_s:
+            self.tell(line)
+            found = self.says(f"(?:{answer})|(?P<again>{again})")
+            if found["again"] is None:
+                return found
+            time.sleep(AGAIN_S)
+        pytest.fail(f"again and again: {again}\n{self.output}")
 
     def ended(self, limit_s: float = PATIENCE_S) -> int:
         """Wait for its end; gives the exit code."""

@@ -20,6 +20,8 @@ from tests.support.rig import GUIDED, HOLD
 AROUND = ((-1e-3, -1e-3), (1e-3, -1e-3), (1e-3, 1e-3), (-1e-3, 1e-3))
 CORNERS = [(HOME_DEG[0] + north, HOME_DEG[1] + east) for north, east in AROUND]
 GEOFENCE = 1 << 20
+BUSY = "AP: Mission upload timeout"
+"""Simulated time runs five times as fast: a client that gets no turn for two seconds is late."""
 
 
 @contextmanager
@@ -54,7 +56,7 @@ def units(places: tuple[tuple[float, float], ...] | list[tuple[float, float]]) -
 def lists_up_and_down(ground: Program, here: Scene, folder: Path) -> None:
     """Mission, rally points and fence: sent, read back by MAVProxy, and looked at by somebody else."""
     mission, rally, fence = write_files(folder)
-    ground.told(f"wp load {mission}", "AP: Flight plan received")
+    ground.told(f"wp load {mission}", "AP: Flight plan received", again=BUSY)
     back = folder / "back.txt"
     ground.told("wp list", "Saved 3 waypoints")
     ground.told(f"wp save {back}", "Saved 3 waypoints")
@@ -72,11 +74,11 @@ def lists_up_and_down(ground: Program, here: Scene, folder: Path) -> None:
     assert send(here.witness.link, loader, 0) == 0
     ground.told("wp list", "Saved 4 waypoints")
 
-    ground.told(f"rally load {rally}", "AP: Rally points received")
+    ground.told(f"rally load {rally}", "AP: Rally points received", again=BUSY)
     ground.told("rally list", "Saved 2 rally items")
     assert [(one.x, one.y) for one in here.witness.items(2)] == units(PLACES)
 
-    ground.told(f"fence load {fence}", "TYPE_FENCE: ACCEPTED")
+    ground.told(f"fence load {fence}", "TYPE_FENCE: ACCEPTED", again=BUSY)
     ground.told("fence list", "Saved 5 fence items")
     assert [(one.x, one.y) for one in here.witness.items(1) if one.command == 5001] == units(CORNERS)
     for order, enabled in (("enable", True), ("disable", False)):
@@ -113,9 +115,10 @@ def requested_goal(ground: Program, here: Scene) -> None:
     """A place for the companion, which it drives to first; one that is too far away; both as a person types them."""
     place = PLACES[0]
     ground.tell("set target_component 191")
-    ground.told(f"guided {place[0] + 0.1} {place[1]} 0", "DO_REPOSITION: DENIED")
+    later = "DO_REPOSITION: TEMPORARILY_REJECTED"  # it stands for a moment where the computer is busy
+    ground.told(f"guided {place[0] + 0.1} {place[1]} 0", "DO_REPOSITION: DENIED", again=later)
     ground.says("AP: Requested goal refused: .* m away, farther than 300 m")
-    ground.told(f"guided {place[0]} {place[1]} 0", "DO_REPOSITION: ACCEPTED")
+    ground.told(f"guided {place[0]} {place[1]} 0", "DO_REPOSITION: ACCEPTED", again=later)
     ground.says("AP: Requested goal 1: .* m away, then the mission goes on")
     ground.tell("set target_component 1")
     here.companion.says("Reached requested goal 1")

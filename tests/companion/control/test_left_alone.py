@@ -312,7 +312,7 @@ def test_its_way_is_as_long_as_physics_makes_it(lasts_s: float) -> None:
     st.floats(0.0, 1.5),
     st.floats(-1.5, 1.5),
     st.sampled_from([0.1, 0.2, 0.33, 0.5]),
-    st.booleans(),
+    st.sampled_from([None, math.inf, 3.0]),
 )
 def test_it_leads_where_the_planning_thinks_though_reckoned_apart(
     lately: list[tuple[float, float]],
@@ -320,14 +320,15 @@ def test_it_leads_where_the_planning_thinks_though_reckoned_apart(
     speed_m_s: float,
     turn_rad_s: float,
     dead_s: float,
-    placed: bool,
+    placed_m_s: float | None,
 ) -> None:
     """A last look that went another way would refuse what was planned well."""
     moment = replace(
         view(open_ground(), speed_m_s),
         yaw_rate_rad_s=turn_rad_s,
         lately=tuple(ToldVelocity(-0.05 * (len(lately) - i), *one) for i, one in enumerate(lately)),
-        placed_s=-0.05 * (len(lately) + 1) if placed else -math.inf,
+        placed_s=-math.inf if placed_m_s is None else -0.05 * (len(lately) + 1),
+        placed_m_s=placed_m_s or math.inf,
         settings=Settings.model_validate({"guidance": {"controller": "motion-ga"}}),
     )
     moment = replace(moment, following=moment.following._replace(dead_s=dead_s))
@@ -377,3 +378,4 @@ def test_just_after_a_position_the_rover_still_drives_on() -> None:
     assert fault(slow, replace(view(evidence, 0.2), lately=first)) is None
     after = replace(view(evidence, 0.2), lately=first, placed_s=-0.1)
     assert fault(slow, after) is SetpointFault.INTO_OBSTACLE
+    assert fault(slow, replace(after, placed_m_s=0.2)) is None, "on a leg that is driven slowly"

@@ -114,6 +114,18 @@ def test_speed_goes_with_positions_when_it_changes_and_now_and_then():
     assert not speeds([(0.0, look(10.0)), (0.1, ControlCommand(Purpose.BRAKE, STOP, 0.0))])
 
 
+def test_positions_are_driven_to_as_fast_as_was_told_last_or_before():
+    """The slower speed may not have come yet."""
+    sent = SentSetpoints()
+    told = []
+    for t, speed_m_s in ((0.0, 2.0), (3.0, 2.0), (4.0, 1.0), (7.0, 1.0)):
+        sent.due(drive(8.0, speed_m_s), t, SETTINGS, 3.0, confirmed=True)
+        told.append(sent.placed_m_s)
+    assert told == [math.inf, 2.0, 2.0, 1.0]
+    sent.reset()
+    assert sent.placed_m_s == math.inf
+
+
 def test_after_a_reset_everything_is_new():
     sent = SentSetpoints()
     sent.due(drive(8.0), 0.0, SETTINGS, 3.0, confirmed=True)
