@@ -187,8 +187,8 @@ def _obeys_s(view: LocalView) -> tuple[float, ...]:
 def _tells(setpoint: GuidedVelocity, view: LocalView, obeys_s: float) -> NDArray[np.float64]:
     """From when on which speed and turn rate have their effect, one a row; the last one is the setpoint's.
 
-    Where no velocity was told, the rover goes on as it does; a position tells it to drive on, as fast as was told with
-    it: on a leg with a speed of its own that is another one than the mission's.
+    Where no velocity was told, the rover goes on as it does; a position tells it to drive on, as fast as was told for
+    that; as fast as the mission says where that is not known.
     """
     now_s, on_m_s = view.pose.time_s, view.forward_m_s
     if view.by_position(now_s - obeys_s):

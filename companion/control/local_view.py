@@ -30,7 +30,8 @@ class LocalView:
     """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive.
 
     ``told``: the setpoint of the tick before; None where there was none. ``lately``: the velocities told before.
-    ``placed_s``: when a position was told last, and the autopilot drives to it by up to ``placed_m_s``.
+    ``placed_s``: when a position was told last, and the autopilot drives to it by up to ``placed_m_s``; inf where that
+    is not known.
     ``held_m_s``: so much slower than its throttle would let it go on firm ground; ``dragged_m_s``: and for some time,
     0 where that may have another reason. ``lately_held``: its throttle and steering may still be open from that, see
     ``drag``. ``rolls_back``: it moves tail first.

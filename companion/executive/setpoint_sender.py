@@ -40,7 +40,10 @@ class SentSetpoints:
 
     @property
     def placed_m_s(self) -> float:
-        """How fast the autopilot drives to positions at most, as told last and before; inf until both are known."""
+        """How fast the autopilot drives to positions, as told last or before that; inf until both are known.
+
+        What it answered does not count, nor what others tell it.
+        """
         speeds_m_s = (self._speed_m_s, self._speed_before_m_s)
         return math.inf if any(map(math.isnan, speeds_m_s)) else max(speeds_m_s)
 

@@ -131,7 +131,7 @@ Missions = Annotated[
 ]
 Sensors = Annotated[
     str | None,
-    typer.Option(help="missions: suites of sensors, separated by commas; default: lidar-90,lidar-360,beams."),
+    typer.Option(help=f"{_of('--sensors')}: suites, separated by commas; default: lidar-90,lidar-360,beams."),
 ]
 Guard = Annotated[bool, typer.Option("--guard", help=f"{_of('--guard')}: with the guard on the autopilot.")]
 Off = Annotated[

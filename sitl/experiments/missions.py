@@ -96,9 +96,10 @@ class MissionsReport(ExperimentReport):
 
     @property
     def section_name(self) -> str:
-        """See ``ExperimentReport``. Later seeds stand beside those from 0 on: all at once take hours."""
+        """See ``ExperimentReport``. Later seeds, and parts, stand beside the whole: all at once take hours."""
         later = f"-from-{self.options.seed}" if self.options.seed else ""
-        return super().section_name + ("-guarded" if self.options.guard else "") + later
+        some = "".join(f"-{name}" for name in (*self.options.missions, *self.options.sensors))
+        return super().section_name + ("-guarded" if self.options.guard else "") + later + some
 
     def tables(self) -> list[Table]:
         """One for each suite of sensors."""
@@ -108,6 +109,11 @@ class MissionsReport(ExperimentReport):
         """Every drive."""
         drives = [asdict(one) for one in self.drives]
         return {"experiment": NAME, "seed": self.options.seed, "runs": self.options.runs, "drives": drives}
+
+    @property
+    def _what(self) -> str:
+        """Which missions, in words."""
+        return " and ".join(f"`{name}`" for name in self.options.missions) or "Each mission"
 
     def _rows(self, suite: str) -> list[list[str]]:
         own = [one for one in self.drives if one.suite == suite]
@@ -122,15 +128,17 @@ class MissionsReport(ExperimentReport):
         guard = ", with the guard on the autopilot" if self.options.guard else ""
         first, after = self.options.seed, self.options.seed + self.options.runs
         later = f", seeds {first} to {after - 1}" if first else ""
-        return f"""## Every shipped mission{guard}{later}{self.options.timeout_title}
+        which = "Some shipped missions" if self.options.missions else "Every shipped mission"
+        return f"""## {which}{guard}{later}{self.options.timeout_title}
 
 `{self.options.command(NAME)}`
 
-Each mission with each suite of sensors, {self.options.runs} seeds each{guard}. Speed, lag, turn rate and limits of a
-rover that turns on the spot are {self.options.mismatch}. *touched*: contacts while the rover
-moved; *run into*: it stood, and something that moves came along; *refused*: setpoints that the last look replaced by a
-stop; *missed*: targets not reached though there is a way; *mean s*: driving time, with its 95 % interval by resampling
-seeds. With thin beams, and on arcs, points lead the rover whatever is asked for.
+{self._what} with each suite of sensors below, {self.options.runs} seeds each{guard}.
+Speed, lag, turn rate and limits of a rover that turns on the spot are {self.options.mismatch}.
+*touched*: contacts while the rover moved; *run into*: it stood, and something that moves came along; *refused*:
+setpoints that the last look replaced by a stop; *missed*: targets not reached though there is a way; *mean s*: driving
+time, with its 95 % interval by resampling seeds. With thin beams, and on arcs, points lead the rover whatever
+is asked for.
 
 {tables}
 """

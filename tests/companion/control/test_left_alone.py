@@ -369,6 +369,17 @@ def test_without_a_guard_the_rover_may_turn_still_more_and_less_than_told() -> N
         assert least_rad / told_rad == pytest.approx(1.0 - off, abs=0.05)
 
 
+def test_on_a_slower_leg_planning_and_last_look_count_on_the_speed_that_was_told_before() -> None:
+    """The planning sees the leg's speed, the last look the mission's; the rover still goes to a place at 2 m/s."""
+    seen = replace(view(open_ground(), 1.0), placed_s=-0.1, placed_m_s=2.0)
+    seen = replace(seen, rover=replace(seen.rover, cruise_speed_m_s=3.0))
+    leg = seen.with_speeds(1.0, 3.0)
+    assert set(_pending(leg, _latest(leg), ALONE_STEP_S)[:, 0]) == {2.0}
+    ways = [ways_left_alone(GuidedVelocity(0.5, 0.0), one) for one in (seen, leg)]
+    assert ways[0] is not None and ways[1] is not None
+    assert all((one == other).all() for one, other in zip(*ways, strict=True))
+
+
 def test_just_after_a_position_the_rover_still_drives_on() -> None:
     """The velocity told since has not had its effect yet."""
     evidence = open_ground()

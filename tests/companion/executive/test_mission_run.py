@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from companion.control.controller import STANDSTILL
+from companion.control.controller import STANDSTILL, Purpose
 from companion.control.drag import DragWatch
 from companion.control.local_view import LocalView
 from companion.control.point_controller import ControlCommand
+from companion.core.frames import NedPoint
 from companion.executive.mission_executor import MissionExecutor, MissionTask
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.mission_run import LocatedScan, MissionRun, Order, Stop
@@ -64,6 +66,22 @@ def test_a_mission_that_drives_speaks_setpoints_that_were_checked(tmp_path: Path
     desk.run.speak(command, desk.now_s)
     assert desk.autopilot.taken()[0] == command.setpoint
     assert desk.run.setpoint_check.refused.total() == 0
+
+
+def test_what_is_seen_of_a_moment_has_how_fast_positions_were_told_to_be_driven_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = list[LocalView]()
+    guide = MissionExecutor.guide
+    monkeypatch.setattr(MissionExecutor, "guide", lambda self, task, view: seen.append(view) or guide(self, task, view))
+    desk = Desk(tmp_path)
+    desk.begin()
+    for speed_m_s in (2.0, 2.0, 1.0, 1.0, 1.0):
+        desk.stand(0.0, 0.0)
+        desk.run.guide(desk.run.decide(DRIVE, desk.now_s), desk.now_s)
+        desk.clock.time_s += 4.0
+        desk.run.speak(ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(5.0, 0.0)), speed_m_s), desk.now_s)
+    assert [view.placed_m_s for view in seen] == [math.inf, math.inf, 2.0, 2.0, 1.0]
 
 
 def test_positions_come_nearer_where_the_throttle_is_open_and_the_rover_stands(tmp_path: Path) -> None:

@@ -76,7 +76,8 @@ def test_some_suites_of_sensors_can_be_chosen(monkeypatch: pytest.MonkeyPatch) -
     report = missions.run(options, lambda done, of: None)
     assert [one.suite for one in report.drives] == ["lidar-90", "beams"] and len(driven) == 2
     assert "`beams`:" in report.section() and "`lidar-360`:" not in report.section() and len(report.tables()) == 2
-    assert "--missions rooms --sensors beams,lidar-90" in report.section()
+    assert "--missions rooms --sensors beams,lidar-90" in report.section() and "\n`rooms` with each" in report.section()
+    assert report.section_name == "missions-rooms-beams-lidar-90", "a part does not take the place of the whole"
     with pytest.raises(ExperimentError, match="--sensors: 'beam' is unknown, did you mean 'beams'"):
         missions.run(Options(1, sensors=("beam",)), lambda done, of: None)
 
