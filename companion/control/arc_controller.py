@@ -22,6 +22,7 @@ from companion.control.local_view import LocalView
 from companion.control.manoeuvre import ArcSegment, Manoeuvre, Try, find_manoeuvre, tries
 from companion.control.point_controller import speed_limit_m_s
 from companion.control.reference_path import STEP_M, Points, ReferencePath
+from companion.control.safe_reach import FLANK_M, FLANK_NEAR_M
 from companion.core.frames import Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.map_queries import ArcQueries, Followed, FollowLimits, Until, clearance_m
@@ -228,8 +229,8 @@ class _Ways:
             steering_per_m2=sharpest_per_m / max(steering.steer_time_s * speed_m_s, 0.05),
             lookahead_m=steering.ahead_m + steering.ahead_s * abs(self.rolling.speed_m_s),
             room_m=self._room_m(clearance_m),
-            flank_m=radius_m + 0.05,
-            near_m=radius_m + 0.2,
+            flank_m=radius_m + FLANK_M,
+            near_m=radius_m + FLANK_NEAR_M,
             astray_m=steering.astray_m,
         )
         horizon_m = view.settings.guidance.horizon_m
@@ -256,7 +257,8 @@ class _Ways:
         view, guidance, steering = self.view, self.view.settings.guidance, self.view.settings.steering
         slowest_m_s = guidance.min_speed_m_s if not backwards else guidance.back_out_speed_m_s
         creep_m = braking_distance_m(slowest_m_s, guidance)
-        reach_m = min(ahead.clear_m, ahead.seen_m + creep_m)
+        # Tail first it does not creep over unseen ground: no look shows what is there.
+        reach_m = min(ahead.clear_m, ahead.seen_m + (0.0 if backwards else creep_m))
         if reach_m < max(self.needed_m, creep_m) + 0.1:
             return stop_for(Purpose.BLOCKED) if self.is_stopped else self.brake()
         limit_m_s = fastest_within_m(min(reach_m, left_m), guidance)
@@ -298,13 +300,14 @@ class _Ways:
         rate, now_m_s = self._turn_rate(curvature_per_m), abs(self.rolling.speed_m_s)
         narrow = self.view.rover.narrow_sight
         room_m, speed_m_s = self._room_m(NARROW_ROOM_M if narrow else TOUCH_M), wanted_m_s
+        tail_m = self.view.rover.radius_m + FLANK_M if backwards else 0.0
         while speed_m_s > LEFT_ALONE_M_S:
             reach_m = blind_distance_m(max(speed_m_s, now_m_s), guidance) + TOUCH_M
             gap_m = GAP_M if narrow and speed_m_s > BESIDE_GAP_M_S else 0.0
             free_m = math.inf
             for arc_m_s in (now_m_s, speed_m_s):
                 arc_per_m = rate / max(arc_m_s, steering.scale_base_m_s)
-                arc_m = self._arcs.arc_clear_m(course_rad, arc_per_m, room_m, reach_m, Until.UNSEEN, gap_m)
+                arc_m = self._arcs.arc_clear_m(course_rad, arc_per_m, room_m, reach_m, Until.UNSEEN, gap_m, tail_m)
                 free_m = min(free_m, arc_m)
             if free_m >= reach_m - 1e-6:
                 return speed_m_s

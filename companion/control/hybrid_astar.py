@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.mapping.arc_kernels import BLOCKED, UNSEEN, is_unseen, place
+from companion.mapping.arc_kernels import BLOCKED, UNSEEN, is_tail_unseen, is_unseen, place
 
 HEADINGS = 36
 """So many headings are told apart."""
@@ -55,8 +55,9 @@ class ArcLimits(NamedTuple):
     """The arcs that the rover can drive, and how far to search.
 
     ``sharpest``: greatest curvature. ``step``: length of an arc. ``window``: half side of the square searched.
-    ``bin``: side of a small square. ``room``: kept clear round the middle. ``first_way``: 1 or -1 if the way must
-    begin forwards or backwards, else 0. ``expansions``: at most so many poses are expanded.
+    ``bin``: side of a small square. ``room``: kept clear round the middle. ``tail``: so far behind the middle the
+    ground must have been seen where the rover goes backwards. ``first_way``: 1 or -1 if the way must begin forwards or
+    backwards, else 0. ``expansions``: at most so many poses are expanded.
     """
 
     sharpest: float
@@ -64,6 +65,7 @@ class ArcLimits(NamedTuple):
     window: int
     bin: int
     room: float
+    tail: float
     switch_cost: float
     first_way: int
     expansions: int
@@ -157,6 +159,8 @@ def _arc_cost(
         if way < 0.0 and (_unseen_around(ground, x + 0.5 * dx, y + 0.5 * dy) or _unseen_around(ground, x + dx, y + dy)):
             return x, y, heading, math.inf
         x, y, heading = x + dx, y + dy, heading + curvature * piece
+        if way < 0.0 and is_tail_unseen(ground, x, y, heading + math.pi, limits.tail):
+            return x, y, heading, math.inf
         state = _state(ground, known, left, low, x, y, limits.room)
         if state == BLOCKED:
             return x, y, heading, math.inf

@@ -325,12 +325,14 @@ def meets(places, outline, under, under_m, evidence):
 
 @njit(cache=True, nogil=True)
 def passes(way, disc, away, deep_m, evidence):
-    """See ``along``; places count from the map's corner. What the disc lies over at first may be left, not entered."""
+    """See ``along``; places count from the map's corner. What the disc lies over at first may be left, not entered, and
+    the field that it begins in may be closed."""
     place = np.array((way[0, 0], way[0, 1], 0.0))
     begins_m, _ = _deepest(place, disc, way[0], math.inf, evidence)
     height, width = evidence.log_odds.shape
     cell_m, count = evidence.cell_m, way.shape[0]
-    corner_m = CORNER * cell_m * (height // evidence.base.shape[0])
+    field_m = cell_m * (height // evidence.base.shape[0])
+    own_y, own_x = math.floor(way[0, 0] / field_m), math.floor(way[0, 1] / field_m)
     seen, unseen_m = count, -PIECE_M
     for at in range(1, count):
         place[0], place[1] = way[at, 0], way[at, 1]
@@ -344,6 +346,7 @@ def passes(way, disc, away, deep_m, evidence):
         lies_m, _ = _deepest(place, disc, way[0], math.inf, evidence)
         if lies_m > max(begins_m + AWAY_M - away * gone_m, deep_m):
             return at, seen
-        if gone_m > corner_m and _is_deep_in_closed(place, evidence, True):
+        is_own = math.floor(place[0] / field_m) == own_y and math.floor(place[1] / field_m) == own_x
+        if gone_m > CORNER * field_m and not is_own and _is_deep_in_closed(place, evidence, True):
             return at, seen
     return count, seen

@@ -25,6 +25,8 @@ REACHED, STOPPED, LOST = 0, 1, 2
 """How following a line ends: at its end, at an obstacle, or too far beside the line to follow it."""
 STEP_CELLS = 1.0
 """Length of a step along an arc."""
+TAIL_RAD = (-0.25 * math.pi, 0.0, 0.25 * math.pi)
+"""Directions, from that of travel, in which the rim of a rover that goes backwards must be on seen ground."""
 LATE_RAD = 0.6 * math.pi
 """A place on the line that lies farther aside cannot be steered for: the rover would have to turn round first."""
 
@@ -55,8 +57,8 @@ class Following(NamedTuple):
 
     ``backwards``: tail first. ``sharpest``: greatest curvature. ``steering``: greatest change of curvature over one
     cell. ``lookahead``: how far ahead on the line the place lies that is steered for. ``room``: kept clear round
-    the middle. ``flank``: how far beside the middle the ground must have been seen, from ``near`` on. ``astray``:
-    farther beside the line the rover is lost.
+    the middle. ``flank``: how far beside the middle the ground must have been seen, from ``near`` on; backwards also
+    behind the rover, from the first step on. ``astray``: farther beside the line the rover is lost.
     """
 
     backwards: bool
@@ -90,6 +92,18 @@ def is_unseen(ground: Any, x: float, y: float) -> bool:
     height, width = ground.log_odds.shape
     cx, cy = int(math.floor(x)), int(math.floor(y))
     return bool(0 <= cx < width and 0 <= cy < height and ground.log_odds[cy, cx] == 0.0)
+
+
+@njit(cache=True, nogil=True)
+def is_tail_unseen(ground: Any, x: float, y: float, course: float, reach: float) -> bool:
+    """Whether a rover that goes backwards has unseen ground so far before its middle: no sensor looks there.
+
+    ``course``: direction of travel.
+    """
+    for aside in TAIL_RAD:
+        if is_unseen(ground, x + reach * math.sin(course + aside), y + reach * math.cos(course + aside)):
+            return True
+    return False
 
 
 @njit(cache=True, nogil=True)
@@ -128,10 +142,12 @@ def arc_clear(
     length: float,
     stop_at: int,
     gap: float,
+    tail: float,
 ) -> float:
     """How far the rover can go on an arc before it stands on a place of kind ``stop_at`` (UNSEEN or BLOCKED) or worse.
 
     At most ``length``. ``course``: direction of travel. ``gap``: see ``is_beside_gap``; it does not stand there either.
+    ``tail``: see ``is_tail_unseen``, 0 for a rover that goes forwards; it does not come there.
     """
     gone = 0.0
     while gone < length:
@@ -139,6 +155,8 @@ def arc_clear(
         middle = course + 0.5 * curvature * step
         x, y, course = x + step * math.sin(middle), y + step * math.cos(middle), course + curvature * step
         if place(ground, x, y, room) >= stop_at or is_beside_gap(ground, x, y, room, gap):
+            return gone
+        if tail > 0.0 and is_tail_unseen(ground, x, y, course, tail):
             return gone
         gone += step
     return gone
@@ -203,7 +221,9 @@ def follow(ground: Any, following: Any, line: Points, start: Any, length: float)
             end, clear = STOPPED, gone
             break
         if gone < seen and (
-            state == UNSEEN or (gone > following.near and _flank_unseen(ground, x, y, course, following.flank))
+            state == UNSEEN
+            or (gone > following.near and _flank_unseen(ground, x, y, course, following.flank))
+            or (following.backwards and is_tail_unseen(ground, x, y, course, following.flank))
         ):
             seen = gone
         gone += STEP_CELLS

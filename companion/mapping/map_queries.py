@@ -51,7 +51,7 @@ class FollowLimits:
 
     ``steering_per_m2``: greatest change of curvature over a metre. ``lookahead_m``: how far ahead on the line it
     steers for. ``room_m``: kept clear round its middle. ``flank_m``: so far beside the middle the ground must have
-    been seen, from ``near_m`` ahead on. ``astray_m``: farther beside the line it is lost.
+    been seen, from ``near_m`` ahead on; backwards also behind it. ``astray_m``: farther beside the line it is lost.
     """
 
     backwards: bool
@@ -144,18 +144,20 @@ class ArcQueries:
         length_m: float,
         until: Until,
         gap_m: float = 0.0,
+        tail_m: float = 0.0,
     ) -> float:
         """How far the rover can go on an arc with so much room round its middle, at most ``length_m``.
 
         ``course_rad``: direction of travel. ``curvature_per_m``: clockwise positive, as seen in the direction of
         travel. ``gap_m``: ground within the room that has not been seen ends it too, if an obstacle is nearer to that
-        ground than this.
+        ground than this. ``tail_m``: so far before its middle the ground must have been seen, for a rover that goes
+        backwards; 0 for one that goes forwards.
         """
         frame = self._frame
         curvature, room, length = frame.per_cell(curvature_per_m), frame.cells(room_m), frame.cells(length_m)
-        stop_at, gap = int(until), frame.cells(gap_m)
+        stop_at, gap, tail = int(until), frame.cells(gap_m), frame.cells(tail_m)
         return frame.metres(
-            arc_clear(self._ground, self._x, self._y, course_rad, curvature, room, length, stop_at, gap)
+            arc_clear(self._ground, self._x, self._y, course_rad, curvature, room, length, stop_at, gap, tail)
         )
 
     def arc_is_clear(

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from companion.control.arc_controller import ArcController
-from companion.control.braking import braking_distance_m
+from companion.control.arc_controller import ArcController, Rolling, _Ways
+from companion.control.braking import blind_distance_m, braking_distance_m
 from companion.control.collision_avoidance import avoided
 from companion.control.controller import ControlCommand, Purpose
 from companion.control.local_view import LocalView
@@ -18,6 +18,7 @@ from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.executive.goal_driver import GoalDriver
 from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
+from companion.mapping.map_queries import Followed
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.search_budget import PathSearcher
@@ -173,8 +174,33 @@ def test_it_never_goes_backwards_over_ground_it_has_not_seen() -> None:
     car = Car(ground([(23.0, 17.0, 23.5, 23.0), (19.5, 17.0, 23.0, 18.5), (19.5, 21.5, 23.0, 23.0)], behind_unseen),
               path((0, 0), (-10, 0)), pose(time_s=1.0))  # fmt: skip
     car.drive(20.0)
-    assert min(p.north_m for p in car.poses) > 19.4 - 0.3
+    assert min(p.north_m for p in car.poses) - ROVER.radius_m > 19.4
     assert car.least_room_m > 0.0
+
+
+def test_turning_backwards_its_tail_stays_on_seen_ground() -> None:
+    """As it comes out of a bay: the middle and the flanks would be on seen ground, the tail beside a wall not."""
+    car = Car(ground([(23.0, 17.0, 23.5, 23.0)], [(0.0, 0.0, 18.0, 40.0)]), path((0, 0), (0, -8)), pose(time_s=1.0))
+    car.drive(30.0)
+    assert car.reached
+    assert min(command.setpoint.forward_m_s for command in car.commands) < 0.0  # type: ignore[union-attr]
+    tails = [p.point.moved(p.heading_rad + math.pi, ROVER.radius_m) for p in car.poses]
+    assert min(tail.north_m for tail in tails) > 18.0
+
+
+def test_backwards_it_does_not_creep_over_unseen_ground() -> None:
+    """With 0.2 m of seen ground before it; forwards a look would have shown what is there."""
+    ways, ahead = _Ways(view(ground(), pose()), Rolling(0.0, 0.0), 0.0), Followed(5.0, 0.2, 0.0)
+    assert ways.drive(ahead, backwards=False, left_m=5.0).purpose is Purpose.DRIVE
+    assert ways.drive(ahead, backwards=True, left_m=5.0).purpose is Purpose.BLOCKED
+
+
+def test_left_alone_backwards_its_tail_ends_on_seen_ground() -> None:
+    seen_m = 2.0
+    ways = _Ways(view(ground(unseen=[(0.0, 0.0, MIDDLE - seen_m, 40.0)]), pose()), Rolling(0.0, 0.0), 0.0)
+    told = ways.drive(Followed(math.inf, math.inf, 0.0), backwards=True, left_m=8.0).setpoint
+    assert isinstance(told, GuidedVelocity) and told.forward_m_s < -0.2
+    assert blind_distance_m(-told.forward_m_s, SETTINGS.guidance) + ROVER.radius_m <= seen_m
 
 
 def test_it_can_stop_within_what_it_has_seen() -> None:

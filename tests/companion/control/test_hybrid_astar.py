@@ -14,7 +14,9 @@ from companion.mapping.map_queries import ground_at
 from companion.settings import MappingSettings
 
 MIDDLE = 80.0
-LIMITS = ArcLimits(sharpest=0.05, step=4.0, window=64, bin=2, room=4.0, switch_cost=8.0, first_way=0, expansions=2000)
+LIMITS = ArcLimits(
+    sharpest=0.05, step=4.0, window=64, bin=2, room=4.0, tail=0.0, switch_cost=8.0, first_way=0, expansions=2000
+)
 
 
 def open_map() -> EvidenceMap:
@@ -107,6 +109,15 @@ def test_a_closed_field_is_not_entered_but_left() -> None:
     assert len(found(evidence, goal(32.0, 0.0))) > 1, "the field that the rover stands in does not count"
     evidence.base.weights[here.y + 2, :] = 1.0
     assert len(found(evidence, goal(32.0, 0.0))) == 0
+
+
+def test_backwards_the_tail_stays_on_seen_ground() -> None:
+    evidence, back = open_map(), goal(-24.0, 0.0, 0.0, math.radians(25.0), 60.0)
+    evidence.log_odds[: int(MIDDLE) - 26] = 0.0
+    straight_back = {"first_way": -1, "sharpest": 0.001}
+    assert len(found(evidence, back, tail=0.0, **straight_back)) > 1
+    assert len(found(evidence, back, tail=6.0, **straight_back)) == 0
+    assert len(found(evidence, back._replace(y=MIDDLE - 18.0), tail=6.0, **straight_back)) > 1
 
 
 @pytest.mark.parametrize("offset", np.linspace(-1.0, 1.0, 9).tolist())

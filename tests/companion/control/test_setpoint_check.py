@@ -368,6 +368,15 @@ def test_any_velocity_but_zero_is_looked_along() -> None:
         assert fault(Output(GuidedVelocity(forward_m_s, 0.0), pose, 0.0), evidence)
 
 
+@pytest.mark.parametrize(("row", "kind"), [(0, None), (1, SetpointFault.INTO_OBSTACLE)], ids=["its own", "the next"])
+def test_a_rover_crosses_the_field_that_it_stands_in_though_it_is_closed(row: int, kind: SetpointFault | None) -> None:
+    """As guidance does. It begins at the field's edge and would end 0.9 m farther on."""
+    evidence, pose = open_ground(), Pose(MIDDLE + 0.01, MIDDLE + 0.5, 0.0, 0.0)
+    evidence.penalty[int(MIDDLE) + row, int(MIDDLE)] = 1.0
+    forward_m_s = 0.3 if row == 0 else 0.6
+    assert fault(Output(GuidedVelocity(forward_m_s, 0.0), pose, 0.0), evidence) is kind
+
+
 @pytest.mark.parametrize("forward_m_s", [0.2, 0.3, 0.45, 0.8, -0.1, -0.3, -0.5])
 @pytest.mark.parametrize("controller", ["points", "motion-ga"])
 def test_a_velocity_that_ends_in_a_wall_is_refused_however_slow_it_is(controller: str, forward_m_s: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -155,6 +156,17 @@ def test_an_arc_ends_beside_unseen_ground_that_is_near_an_obstacle(corner: NedPo
     assert clear_m(1.1) == pytest.approx(4.0 - RADIUS_M, abs=0.25)
 
 
+def test_backwards_the_ground_before_the_rim_must_have_been_seen() -> None:
+    """A cell ahead of the rim, straight or 45 degrees aside; one beside the way does not count."""
+    for aside_m, reached_m in ((0.0, 3.5), (0.35, 3.6), (0.7, 7.0)):
+        evidence = seen_map()
+        put(evidence, 8.06, 8.06 + aside_m, 0.0)
+        arcs = ArcQueries(evidence, Pose(4.06, 8.06, math.pi, 0.0))
+        assert arcs.arc_clear_m(0.0, 0.0, RADIUS_M, 7.0, Until.UNSEEN, 0.0, 0.5) == pytest.approx(reached_m, abs=0.13)
+        if aside_m:
+            assert arcs.arc_clear_m(0.0, 0.0, RADIUS_M, 7.0, Until.UNSEEN) == pytest.approx(7.0), "forwards it may"
+
+
 def test_closed_fields_end_an_arc_but_not_the_one_that_the_rover_stands_in() -> None:
     evidence = seen_map()
     here = Pose(8.5, 8.5, 0.0, 0.0)
@@ -188,6 +200,17 @@ def test_following_ends_at_an_obstacle_and_notes_unseen_ground_before_it() -> No
     followed = ArcQueries(evidence, Pose(4.0, 8.0, 0.0, 0.0)).follow(NORTHWARD, 0.0, LIMITS, 8.0)
     assert followed.clear_m == pytest.approx(6.0 - LIMITS.room_m, abs=0.2)
     assert followed.seen_m == pytest.approx(5.0, abs=0.13)
+
+
+def test_backwards_following_ends_where_the_tail_would_be_on_unseen_ground() -> None:
+    evidence = seen_map()
+    put(evidence, 10.0, 8.3, 0.0)
+    tail_first = ArcQueries(evidence, Pose(4.0, 8.0, math.pi, 0.0))
+    limits = replace(LIMITS, flank_m=0.42, near_m=20.0)
+    backwards = tail_first.follow(NORTHWARD, 0.0, replace(limits, backwards=True), 8.0)
+    assert backwards.seen_m == pytest.approx(5.7, abs=0.15)
+    forwards = ArcQueries(evidence, Pose(4.0, 8.0, 0.0, 0.0))
+    assert forwards.follow(NORTHWARD, 0.0, limits, 8.0).seen_m == math.inf
 
 
 def test_a_line_beside_is_steered_for_and_no_sharper_than_the_rover_can() -> None:
