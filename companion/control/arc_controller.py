@@ -172,7 +172,10 @@ class ArcController:
         if ahead.clear_m < ways.needed_m + LEAST_M:
             self.manoeuvre = None
             return None if stopped else ways.brake()
-        return ways.drive(ahead, backwards=segment.backwards, left_m=left_m)
+        command = ways.drive(ahead, backwards=segment.backwards, left_m=left_m)
+        if stopped and segment.backwards and command.purpose is not Purpose.DRIVE:
+            self.manoeuvre = None  # it would stand before unseen ground for ever
+        return command
 
     def _look_for_manoeuvre(self, path: ReferencePath, ways: _Ways) -> Manoeuvre | None:
         """A new one, if there is one; it is then under way. One try each time, so that no tick takes long.
@@ -231,6 +234,7 @@ class _Ways:
             room_m=self._room_m(clearance_m),
             flank_m=radius_m + FLANK_M,
             near_m=radius_m + FLANK_NEAR_M,
+            tail_m=radius_m + FLANK_M if backwards else 0.0,
             astray_m=steering.astray_m,
         )
         horizon_m = view.settings.guidance.horizon_m

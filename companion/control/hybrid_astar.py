@@ -55,8 +55,8 @@ class ArcLimits(NamedTuple):
     """The arcs that the rover can drive, and how far to search.
 
     ``sharpest``: greatest curvature. ``step``: length of an arc. ``window``: half side of the square searched.
-    ``bin``: side of a small square. ``room``: kept clear round the middle. ``tail``: so far behind the middle the
-    ground must have been seen where the rover goes backwards. ``first_way``: 1 or -1 if the way must begin forwards or
+    ``bin``: side of a small square. ``room``: kept clear round the middle. ``tail``: so far from the middle the rim
+    must be on seen ground where the rover goes backwards. ``first_way``: 1 or -1 if the way must begin forwards or
     backwards, else 0. ``expansions``: at most so many poses are expanded.
     """
 

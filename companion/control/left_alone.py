@@ -325,8 +325,8 @@ def meets(places, outline, under, under_m, evidence):
 
 @njit(cache=True, nogil=True)
 def passes(way, disc, away, deep_m, evidence):
-    """See ``along``; places count from the map's corner. What the disc lies over at first may be left, not entered, and
-    the field that it begins in may be closed."""
+    """See ``along``; places count from the map's corner. What the disc lies over at first may be left, not entered.
+    Experience may have closed the field that it begins in."""
     place = np.array((way[0, 0], way[0, 1], 0.0))
     begins_m, _ = _deepest(place, disc, way[0], math.inf, evidence)
     height, width = evidence.log_odds.shape
@@ -347,6 +347,6 @@ def passes(way, disc, away, deep_m, evidence):
         if lies_m > max(begins_m + AWAY_M - away * gone_m, deep_m):
             return at, seen
         is_own = math.floor(place[0] / field_m) == own_y and math.floor(place[1] / field_m) == own_x
-        if gone_m > CORNER * field_m and not is_own and _is_deep_in_closed(place, evidence, True):
+        if gone_m > CORNER * field_m and _is_deep_in_closed(place, evidence, not is_own):
             return at, seen
     return count, seen

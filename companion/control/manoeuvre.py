@@ -14,6 +14,7 @@ import numpy as np
 from companion.control.hybrid_astar import HEADINGS, ArcLimits, GoalRegion, Poses, find
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, Points, ReferencePath
+from companion.control.safe_reach import FLANK_M
 from companion.core.frames import NedPoint
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.cell_frame import CellFrame
@@ -28,8 +29,6 @@ WINDOW_RADII, LEAST_WINDOW_M = 4.0, 8.0
 AHEAD_RADII, LEAST_AHEAD_M = (2.0, 1.2, 3.2), 2.0
 """How far ahead on the path the place to come back to lies, in turning radii, tried in turn."""
 ANY_RAD = math.pi
-TAIL_M = 0.15
-"""Backwards the ground must have been seen so far beyond the rover's radius: 0.1 m more than the controller asks."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -126,7 +125,7 @@ def _arc_limits(view: LocalView, clearance_m: float, first_way: int) -> ArcLimit
         window=math.ceil(frame.cells(max(WINDOW_RADII * rover.turning_radius_m, LEAST_WINDOW_M))),
         bin=max(1, round(frame.cells(BIN_M))),
         room=frame.cells(room_m),
-        tail=frame.cells(rover.radius_m + TAIL_M),
+        tail=frame.cells(rover.radius_m + FLANK_M),
         switch_cost=frame.cells(settings.switch_cost_m),
         first_way=first_way,
         expansions=settings.most_poses,

@@ -25,8 +25,8 @@ REACHED, STOPPED, LOST = 0, 1, 2
 """How following a line ends: at its end, at an obstacle, or too far beside the line to follow it."""
 STEP_CELLS = 1.0
 """Length of a step along an arc."""
-TAIL_RAD = (-0.25 * math.pi, 0.0, 0.25 * math.pi)
-"""Directions, from that of travel, in which the rim of a rover that goes backwards must be on seen ground."""
+TAIL_RAD = math.pi / 3.0
+"""The rim of a rover that goes backwards must be on seen ground so far to either side of the direction of travel."""
 LATE_RAD = 0.6 * math.pi
 """A place on the line that lies farther aside cannot be steered for: the rover would have to turn round first."""
 
@@ -57,8 +57,8 @@ class Following(NamedTuple):
 
     ``backwards``: tail first. ``sharpest``: greatest curvature. ``steering``: greatest change of curvature over one
     cell. ``lookahead``: how far ahead on the line the place lies that is steered for. ``room``: kept clear round
-    the middle. ``flank``: how far beside the middle the ground must have been seen, from ``near`` on; backwards also
-    behind the rover, from the first step on. ``astray``: farther beside the line the rover is lost.
+    the middle. ``flank``: how far beside the middle the ground must have been seen, from ``near`` on. ``tail``: see
+    ``is_tail_unseen``; 0 for a rover that goes forwards. ``astray``: farther beside the line the rover is lost.
     """
 
     backwards: bool
@@ -68,6 +68,7 @@ class Following(NamedTuple):
     room: float
     flank: float
     near: float
+    tail: float
     astray: float
 
 
@@ -95,13 +96,24 @@ def is_unseen(ground: Any, x: float, y: float) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def is_tail_unseen(ground: Any, x: float, y: float, course: float, reach: float) -> bool:
-    """Whether a rover that goes backwards has unseen ground so far before its middle: no sensor looks there.
+def is_tail_unseen(ground: Any, x: float, y: float, course: float, tail: float) -> bool:
+    """Whether the rim of a rover that goes backwards, ``tail`` away from its middle, lies on unseen ground.
 
-    ``course``: direction of travel.
+    ``course``: direction of travel. A single cell does not count: such holes are left between readings. With a ``tail``
+    of 0 nothing does.
     """
-    for aside in TAIL_RAD:
-        if is_unseen(ground, x + reach * math.sin(course + aside), y + reach * math.cos(course + aside)):
+    if tail <= 0.0:
+        return False
+    pieces = int(math.ceil(2.0 * TAIL_RAD * tail))
+    for at in range(pieces + 1):
+        towards = course + TAIL_RAD * (2.0 * at / pieces - 1.0)
+        rim_x, rim_y = x + tail * math.sin(towards), y + tail * math.cos(towards)
+        if is_unseen(ground, rim_x, rim_y) and (
+            is_unseen(ground, rim_x - 1.0, rim_y)
+            or is_unseen(ground, rim_x + 1.0, rim_y)
+            or is_unseen(ground, rim_x, rim_y - 1.0)
+            or is_unseen(ground, rim_x, rim_y + 1.0)
+        ):
             return True
     return False
 
@@ -147,7 +159,7 @@ def arc_clear(
     """How far the rover can go on an arc before it stands on a place of kind ``stop_at`` (UNSEEN or BLOCKED) or worse.
 
     At most ``length``. ``course``: direction of travel. ``gap``: see ``is_beside_gap``; it does not stand there either.
-    ``tail``: see ``is_tail_unseen``, 0 for a rover that goes forwards; it does not come there.
+    ``tail``: see ``is_tail_unseen``; it does not come there.
     """
     gone = 0.0
     while gone < length:
@@ -156,7 +168,7 @@ def arc_clear(
         x, y, course = x + step * math.sin(middle), y + step * math.cos(middle), course + curvature * step
         if place(ground, x, y, room) >= stop_at or is_beside_gap(ground, x, y, room, gap):
             return gone
-        if tail > 0.0 and is_tail_unseen(ground, x, y, course, tail):
+        if is_tail_unseen(ground, x, y, course, tail):
             return gone
         gone += step
     return gone
@@ -192,8 +204,8 @@ def pursue(line: Points, at: int, x: float, y: float, course: float, lookahead: 
 def follow(ground: Any, following: Any, line: Points, start: Any, length: float) -> tuple[int, float, float, float]:
     """Play through how the rover follows a line, from its pose and the curvature it drives now, for at most ``length``.
 
-    Returns how that ends, how far the rover gets before it meets an obstacle or is lost, how far its middle and
-    flanks have been seen (both inf if that never ends), and the curvature to steer now.
+    Returns how that ends, how far the rover gets before it meets an obstacle or is lost, how far its middle,
+    flanks and tail have been seen (both inf if that never ends), and the curvature to steer now.
     """
     at, x, y, curvature = 0, start.x, start.y, start.curvature
     course = start.heading + math.pi if following.backwards else start.heading
@@ -223,7 +235,7 @@ def follow(ground: Any, following: Any, line: Points, start: Any, length: float)
         if gone < seen and (
             state == UNSEEN
             or (gone > following.near and _flank_unseen(ground, x, y, course, following.flank))
-            or (following.backwards and is_tail_unseen(ground, x, y, course, following.flank))
+            or is_tail_unseen(ground, x, y, course, following.tail)
         ):
             seen = gone
         gone += STEP_CELLS

@@ -51,7 +51,8 @@ class FollowLimits:
 
     ``steering_per_m2``: greatest change of curvature over a metre. ``lookahead_m``: how far ahead on the line it
     steers for. ``room_m``: kept clear round its middle. ``flank_m``: so far beside the middle the ground must have
-    been seen, from ``near_m`` ahead on; backwards also behind it. ``astray_m``: farther beside the line it is lost.
+    been seen, from ``near_m`` ahead on. ``tail_m``: so far from the middle the rim of a rover that goes backwards must
+    be on seen ground; 0 forwards. ``astray_m``: farther beside the line it is lost.
     """
 
     backwards: bool
@@ -61,6 +62,7 @@ class FollowLimits:
     room_m: float
     flank_m: float
     near_m: float
+    tail_m: float
     astray_m: float
 
 
@@ -150,8 +152,8 @@ class ArcQueries:
 
         ``course_rad``: direction of travel. ``curvature_per_m``: clockwise positive, as seen in the direction of
         travel. ``gap_m``: ground within the room that has not been seen ends it too, if an obstacle is nearer to that
-        ground than this. ``tail_m``: so far before its middle the ground must have been seen, for a rover that goes
-        backwards; 0 for one that goes forwards.
+        ground than this. ``tail_m``: so far from its middle the rim of a rover that goes backwards must be
+        on seen ground; 0 forwards.
         """
         frame = self._frame
         curvature, room, length = frame.per_cell(curvature_per_m), frame.cells(room_m), frame.cells(length_m)
@@ -161,10 +163,17 @@ class ArcQueries:
         )
 
     def arc_is_clear(
-        self, course_rad: float, curvature_per_m: float, room_m: float, length_m: float, until: Until
+        self,
+        course_rad: float,
+        curvature_per_m: float,
+        room_m: float,
+        length_m: float,
+        until: Until,
+        tail_m: float = 0.0,
     ) -> bool:
-        """Whether the rover can go the whole length of an arc."""
-        return self.arc_clear_m(course_rad, curvature_per_m, room_m, length_m, until) >= length_m - 1e-6
+        """Whether the rover can go the whole length of an arc; see ``arc_clear_m``."""
+        clear_m = self.arc_clear_m(course_rad, curvature_per_m, room_m, length_m, until, tail_m=tail_m)
+        return clear_m >= length_m - 1e-6
 
     def follow(self, points: Points, curvature_per_m: float, limits: FollowLimits, length_m: float) -> Followed:
         """Play through how the rover, which drives this curvature now, follows a line for at most ``length_m``."""
@@ -177,6 +186,7 @@ class ArcQueries:
             room=frame.cells(limits.room_m),
             flank=frame.cells(limits.flank_m),
             near=frame.cells(limits.near_m),
+            tail=frame.cells(limits.tail_m),
             astray=frame.cells(limits.astray_m),
         )
         start = Start(self._x, self._y, self._pose.heading_rad, frame.per_cell(curvature_per_m))

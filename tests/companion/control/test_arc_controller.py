@@ -11,6 +11,7 @@ from companion.control.braking import blind_distance_m, braking_distance_m
 from companion.control.collision_avoidance import avoided
 from companion.control.controller import ControlCommand, Purpose
 from companion.control.local_view import LocalView
+from companion.control.manoeuvre import Try, find_manoeuvre
 from companion.control.reference_path import ReferencePath
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
@@ -170,22 +171,45 @@ def test_walled_in_it_stands_and_says_so() -> None:
 
 
 def test_it_never_goes_backwards_over_ground_it_has_not_seen() -> None:
+    """In a dead end, with too little room to turn round before the ground behind ends."""
     behind_unseen = [(0.0, 0.0, 19.4, 40.0)]
     car = Car(ground([(23.0, 17.0, 23.5, 23.0), (19.5, 17.0, 23.0, 18.5), (19.5, 21.5, 23.0, 23.0)], behind_unseen),
-              path((0, 0), (-10, 0)), pose(time_s=1.0))  # fmt: skip
+              path((2, 0), (-10, 0)), pose(north_m=2.0, time_s=1.0))  # fmt: skip
     car.drive(20.0)
-    assert min(p.north_m for p in car.poses) - ROVER.radius_m > 19.4
+    tails = [p.point.moved(p.heading_rad + math.pi, ROVER.radius_m).north_m for p in car.poses]
+    assert 19.4 < min(tails) < 20.2
     assert car.least_room_m > 0.0
 
 
-def test_turning_backwards_its_tail_stays_on_seen_ground() -> None:
-    """As it comes out of a bay: the middle and the flanks would be on seen ground, the tail beside a wall not."""
-    car = Car(ground([(23.0, 17.0, 23.5, 23.0)], [(0.0, 0.0, 18.0, 40.0)]), path((0, 0), (0, -8)), pose(time_s=1.0))
-    car.drive(30.0)
-    assert car.reached
-    assert min(command.setpoint.forward_m_s for command in car.commands) < 0.0  # type: ignore[union-attr]
-    tails = [p.point.moved(p.heading_rad + math.pi, ROVER.radius_m) for p in car.poses]
-    assert min(tail.north_m for tail in tails) > 18.0
+LANE = [(0.0, 17.5, 40.0, 19.1), (0.0, 20.9, 40.0, 22.5), (22.0, 17.5, 23.0, 22.5)]
+"""With a dead end ahead."""
+
+
+@pytest.mark.parametrize(("half_m", "backs"), [(0.25, False), (0.5, True)])
+def test_a_manoeuvre_backwards_keeps_its_tail_on_seen_ground(half_m: float, backs: bool) -> None:
+    """A strip of seen ground, wide enough for its middle or for its tail. It may turn round and look first."""
+    unseen = [(17.0, 19.0, 18.0, MIDDLE - half_m), (17.0, MIDDLE + half_m, 18.0, 21.0)]
+    found = find_manoeuvre(path((0, 0), (-8, 0)), view(ground(LANE, unseen), pose()), Try(5.0, 0.1))
+    assert found is not None
+    tail_first = [segment.points[:, 0] for segment in found.segments if segment.backwards]
+    assert any(((north_m > 17.0) & (north_m < 18.0)).any() for north_m in tail_first) == backs
+
+
+def test_a_manoeuvre_that_cannot_be_driven_on_is_given_up() -> None:
+    """Ground that was seen when it was found is not any more: it does not stand before it for ever."""
+    car = Car(ground(LANE), path((0, 0), (-8, 0)), pose(time_s=1.0))
+    car.drive(2.0)
+    first = car.controller.manoeuvre
+    assert first is not None and car.controller.backwards
+    car.evidence.log_odds[: round(18.0 * 8)] = 0.0
+    car.drive(8.0)
+    assert car.controller.manoeuvre is None or car.controller.manoeuvre.end != first.end
+
+
+def test_what_is_seen_of_a_way_backwards_ends_where_the_tail_would_leave_it() -> None:
+    ways = _Ways(view(ground(unseen=[(0.0, 0.0, MIDDLE - 2.0, 40.0)]), pose()), Rolling(0.0, 0.0), 0.0)
+    followed = ways.follow(path((0, 0), (-6, 0)).points, 0, 0.1, backwards=True)
+    assert followed.seen_m == pytest.approx(2.0 - ROVER.radius_m - 0.05, abs=0.13)
 
 
 def test_backwards_it_does_not_creep_over_unseen_ground() -> None:
@@ -303,10 +327,14 @@ def test_it_makes_way_on_arcs_and_never_turns_on_the_spot() -> None:
     assert isinstance(way.setpoint, GuidedVelocity)
     assert way.setpoint.forward_m_s != 0.0 and way.setpoint.yaw_rate_rad_s != 0.0
     # With walls on both sides there is only straight back.
-    lane = ground([(0.0, 18.0, 40.0, 19.0), (0.0, 21.0, 40.0, 22.0)])
-    way = avoided(now, None, view(lane, pose()), (coming,)).command
+    walls = [(0.0, 18.0, 40.0, 19.0), (0.0, 21.0, 40.0, 22.0)]
+    way = avoided(now, None, view(ground(walls), pose()), (coming,)).command
     assert isinstance(way.setpoint, GuidedVelocity)
     assert way.setpoint.forward_m_s < 0.0 and way.setpoint.yaw_rate_rad_s == 0.0
+    # But not where only its middle would be on seen ground.
+    strip = [(0.0, 19.0, 19.5, MIDDLE - 0.25), (0.0, MIDDLE + 0.25, 19.5, 21.0)]
+    way = avoided(now, None, view(ground(walls, strip), pose()), (coming,)).command
+    assert isinstance(way.setpoint, GuidedVelocity) and way.setpoint.forward_m_s >= 0.0
     # Rolling backwards it is not asked to go forwards at once.
     way = avoided(now, None, view(ground(), pose(), 0.7), (coming,), backwards=True).command
     assert isinstance(way.setpoint, GuidedVelocity) and way.setpoint.forward_m_s <= 0.0

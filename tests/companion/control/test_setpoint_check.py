@@ -368,12 +368,23 @@ def test_any_velocity_but_zero_is_looked_along() -> None:
         assert fault(Output(GuidedVelocity(forward_m_s, 0.0), pose, 0.0), evidence)
 
 
-@pytest.mark.parametrize(("row", "kind"), [(0, None), (1, SetpointFault.INTO_OBSTACLE)], ids=["its own", "the next"])
-def test_a_rover_crosses_the_field_that_it_stands_in_though_it_is_closed(row: int, kind: SetpointFault | None) -> None:
-    """As guidance does. It begins at the field's edge and would end 0.9 m farther on."""
-    evidence, pose = open_ground(), Pose(MIDDLE + 0.01, MIDDLE + 0.5, 0.0, 0.0)
-    evidence.penalty[int(MIDDLE) + row, int(MIDDLE)] = 1.0
-    forward_m_s = 0.3 if row == 0 else 0.6
+@pytest.mark.parametrize(
+    ("row", "column", "by", "kind"),
+    [
+        (0, 0, "experience", None),
+        (1, 0, "experience", SetpointFault.INTO_OBSTACLE),
+        (0, 1, "experience", SetpointFault.INTO_OBSTACLE),
+        (0, 0, "the mission", SetpointFault.INTO_OBSTACLE),
+    ],
+)
+def test_a_rover_crosses_the_field_that_it_stands_in_if_only_experience_closed_it(
+    row: int, column: int, by: str, kind: SetpointFault | None
+) -> None:
+    """As guidance does on arcs. It begins in a corner of its field and would end 0.9 m or 1.9 m farther on."""
+    evidence, pose = open_ground(), Pose(MIDDLE + 0.1, MIDDLE + 0.1, 0.5 * math.pi * column, 0.0)
+    closed = evidence.penalty if by == "experience" else evidence.base.weights
+    closed[int(MIDDLE) + row, int(MIDDLE) + column] = 1.0
+    forward_m_s = 0.3 if kind is None or by == "the mission" else 0.6
     assert fault(Output(GuidedVelocity(forward_m_s, 0.0), pose, 0.0), evidence) is kind
 
 

@@ -36,6 +36,7 @@ LIMITS = FollowLimits(
     room_m=0.4,
     flank_m=0.4,
     near_m=0.55,
+    tail_m=0.0,
     astray_m=1.5,
 )
 NORTHWARD = np.column_stack((np.arange(4.0, 14.0, 0.25), np.full(40, 8.0)))
@@ -156,15 +157,23 @@ def test_an_arc_ends_beside_unseen_ground_that_is_near_an_obstacle(corner: NedPo
     assert clear_m(1.1) == pytest.approx(4.0 - RADIUS_M, abs=0.25)
 
 
-def test_backwards_the_ground_before_the_rim_must_have_been_seen() -> None:
-    """A cell ahead of the rim, straight or 45 degrees aside; one beside the way does not count."""
-    for aside_m, reached_m in ((0.0, 3.5), (0.35, 3.6), (0.7, 7.0)):
-        evidence = seen_map()
-        put(evidence, 8.06, 8.06 + aside_m, 0.0)
-        arcs = ArcQueries(evidence, Pose(4.06, 8.06, math.pi, 0.0))
-        assert arcs.arc_clear_m(0.0, 0.0, RADIUS_M, 7.0, Until.UNSEEN, 0.0, 0.5) == pytest.approx(reached_m, abs=0.13)
-        if aside_m:
-            assert arcs.arc_clear_m(0.0, 0.0, RADIUS_M, 7.0, Until.UNSEEN) == pytest.approx(7.0), "forwards it may"
+@pytest.mark.parametrize("radius_m", [0.2, 0.5, 1.0])
+@pytest.mark.parametrize("towards_deg", [-50, -20, 0, 35, 50])
+def test_backwards_the_rim_stays_on_seen_ground_wherever_that_ends(radius_m: float, towards_deg: float) -> None:
+    """Unseen ground of three cells; where there is no more than a single one it is not looked at."""
+    here, aside_rad = NedPoint(4.06, 8.06), math.radians(towards_deg)
+    rim = NedPoint(here.north_m + 3.0, here.east_m).moved(aside_rad, radius_m)
+    arcs, evidence = {}, {}
+    for side in (1, 3):
+        evidence[side] = seen_map()
+        y, x = (math.floor(v / evidence[side].evidence_m) for v in (rim.north_m, rim.east_m))
+        half = side // 2
+        evidence[side].log_odds[y - half : y + half + 1, x - half : x + half + 1] = 0.0
+        arcs[side] = ArcQueries(evidence[side], Pose(here.north_m, here.east_m, math.pi, 0.0))
+    clear_m = arcs[3].arc_clear_m(0.0, 0.0, 0.1, 6.0, Until.BLOCKED, tail_m=radius_m)
+    assert 2.4 < clear_m < 3.4
+    assert arcs[1].arc_clear_m(0.0, 0.0, 0.1, 6.0, Until.BLOCKED, tail_m=radius_m) == pytest.approx(6.0)
+    assert arcs[3].arc_clear_m(0.0, 0.0, 0.1, 6.0, Until.BLOCKED) == pytest.approx(6.0), "forwards it may"
 
 
 def test_closed_fields_end_an_arc_but_not_the_one_that_the_rover_stands_in() -> None:
@@ -204,11 +213,11 @@ def test_following_ends_at_an_obstacle_and_notes_unseen_ground_before_it() -> No
 
 def test_backwards_following_ends_where_the_tail_would_be_on_unseen_ground() -> None:
     evidence = seen_map()
-    put(evidence, 10.0, 8.3, 0.0)
+    evidence.log_odds[80:84, 65:69] = 0.0
     tail_first = ArcQueries(evidence, Pose(4.0, 8.0, math.pi, 0.0))
-    limits = replace(LIMITS, flank_m=0.42, near_m=20.0)
-    backwards = tail_first.follow(NORTHWARD, 0.0, replace(limits, backwards=True), 8.0)
-    assert backwards.seen_m == pytest.approx(5.7, abs=0.15)
+    limits = replace(LIMITS, near_m=20.0)
+    backwards = tail_first.follow(NORTHWARD, 0.0, replace(limits, backwards=True, tail_m=0.4), 8.0)
+    assert backwards.seen_m == pytest.approx(5.7, abs=0.2)
     forwards = ArcQueries(evidence, Pose(4.0, 8.0, 0.0, 0.0))
     assert forwards.follow(NORTHWARD, 0.0, limits, 8.0).seen_m == math.inf
 
