@@ -125,7 +125,8 @@ def _arc_limits(view: LocalView, clearance_m: float, first_way: int) -> ArcLimit
         window=math.ceil(frame.cells(max(WINDOW_RADII * rover.turning_radius_m, LEAST_WINDOW_M))),
         bin=max(1, round(frame.cells(BIN_M))),
         room=frame.cells(room_m),
-        tail=frame.cells(rover.radius_m + FLANK_M),
+        # The map may be off by decimetres: no nearer to unseen ground than to obstacles.
+        tail=frame.cells(rover.radius_m + max(FLANK_M, clearance_m)),
         switch_cost=frame.cells(settings.switch_cost_m),
         first_way=first_way,
         expansions=settings.most_poses,
