@@ -22,7 +22,7 @@ from companion.control.local_view import LocalView
 from companion.control.manoeuvre import ArcSegment, Manoeuvre, Try, find_manoeuvre, tries
 from companion.control.point_controller import speed_limit_m_s
 from companion.control.reference_path import STEP_M, Points, ReferencePath
-from companion.control.safe_reach import FLANK_M, FLANK_NEAR_M
+from companion.control.safe_reach import FLANK_M, FLANK_NEAR_M, tail_reach_m
 from companion.core.frames import Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.map_queries import ArcQueries, Followed, FollowLimits, Until, clearance_m
@@ -234,7 +234,7 @@ class _Ways:
             room_m=self._room_m(clearance_m),
             flank_m=radius_m + FLANK_M,
             near_m=radius_m + FLANK_NEAR_M,
-            tail_m=radius_m + FLANK_M if backwards else 0.0,
+            tail_m=tail_reach_m(radius_m, backwards=backwards),
             astray_m=steering.astray_m,
         )
         horizon_m = view.settings.guidance.horizon_m
@@ -304,7 +304,7 @@ class _Ways:
         rate, now_m_s = self._turn_rate(curvature_per_m), abs(self.rolling.speed_m_s)
         narrow = self.view.rover.narrow_sight
         room_m, speed_m_s = self._room_m(NARROW_ROOM_M if narrow else TOUCH_M), wanted_m_s
-        tail_m = self.view.rover.radius_m + FLANK_M if backwards else 0.0
+        tail_m = tail_reach_m(self.view.rover.radius_m, backwards=backwards)
         while speed_m_s > LEFT_ALONE_M_S:
             reach_m = blind_distance_m(max(speed_m_s, now_m_s), guidance) + TOUCH_M
             gap_m = GAP_M if narrow and speed_m_s > BESIDE_GAP_M_S else 0.0

@@ -42,7 +42,7 @@ from companion.control.motion_prediction import (
 )
 from companion.control.point_controller import turn_to
 from companion.control.reference_path import ReferencePath
-from companion.control.safe_reach import BACK_LEAST_M_S, FLANK_M, backing_speed_m_s
+from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s, tail_reach_m
 from companion.control.turning_room import may_turn_to
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
 from companion.mapping.map_queries import ArcQueries, Until, look_along
@@ -482,7 +482,7 @@ def _on_arcs(outlook: Outlook) -> Iterator[Option]:
     for tail_first in (outlook.backwards,) if view.speed_m_s > steering.stopped_m_s else (False, True):
         going_m_s = min(guidance.back_out_speed_m_s if tail_first else rover.cruise_speed_m_s, ARC_M_S)
         course_rad = pose.heading_rad + (math.pi if tail_first else 0.0)
-        tail_m = rover.radius_m + FLANK_M if tail_first else 0.0
+        tail_m = tail_reach_m(rover.radius_m, backwards=tail_first)
         for share in ARC_SHARES:
             curvature_per_m = share * sharpest_per_m
             reach_m = max(ARC_M, blind_distance_m(going_m_s, guidance))

@@ -134,6 +134,11 @@ class _Search:
         return Stopping(*map(evidence.frame.cells, lengths_m))
 
 
+def tail_reach_m(radius_m: float, *, backwards: bool) -> float:
+    """How far from its middle the rim of a rover that goes backwards must be on seen ground; 0 forwards."""
+    return radius_m + FLANK_M if backwards else 0.0
+
+
 def unseen_flank(view: LocalView, point: NedPoint) -> Unseen | None:
     """Where the rover's flanks would enter unseen ground on the way to a point."""
     radius_m = view.rover.radius_m
