@@ -333,6 +333,7 @@ def _saved_estimate(estimate: ModelEstimate) -> SavedEstimate:
         gathered_s=estimate.gathered_s,
         braked_s=estimate.braked_s,
         turned_s=estimate.turned_s,
+        steady_s=estimate.steady_s,
     )
 
 

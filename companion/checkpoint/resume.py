@@ -21,7 +21,7 @@ from companion.checkpoint.state_format import (
     SavedState,
 )
 from companion.control.following import Following
-from companion.control.model_estimate import ModelEstimate
+from companion.control.model_estimate import ModelEstimate, bounded
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import Cell
 from companion.executive.command_progress import START, CommandProgress, CommandTally, OpenCommand
@@ -187,7 +187,9 @@ def grid_shift(state: SavedState, layout: MissionLayout) -> Cell:
 def resumed_estimate(saved: SavedEstimate) -> ModelEstimate:
     """How the rover follows velocities, as the earlier run had found."""
     began, figures = (Following(**one.model_dump()) for one in (saved.began, saved.figures))
-    return ModelEstimate(began, figures, saved.gathered_s, saved.braked_s, saved.turned_s)
+    return ModelEstimate(
+        began, bounded(figures, began), saved.gathered_s, saved.braked_s, saved.turned_s, saved.steady_s
+    )
 
 
 def resumed_nav_state(saved: SavedNavState, shift: Cell) -> NavState:

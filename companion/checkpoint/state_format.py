@@ -195,6 +195,7 @@ class SavedFollowing(SavedValues):
     turn_gain: Figure
     off_model: Annotated[float, Field(ge=0.0, lt=1.0)]
     gains_most_m_s2: Figure
+    turn_off_model: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
 
 
 class SavedEstimate(SavedValues):
@@ -205,6 +206,7 @@ class SavedEstimate(SavedValues):
     gathered_s: Seconds
     braked_s: Seconds
     turned_s: Seconds
+    steady_s: Seconds = 0.0
 
 
 class SavedGenerator(SavedValues):

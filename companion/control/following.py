@@ -32,8 +32,8 @@ LONG_OFF = 0.1
 class Following(NamedTuple):
     """It begins after ``dead_s`` and changes speed and turn rate within limits.
 
-    ``turn_gain``: it turns by this factor more than told. ``off_model``: the rover may be off all this by such a share.
-    ``gains_most_m_s2``: no rover gains speed faster than this.
+    ``turn_gain``: it turns by this factor more than told; it may be off that by the share ``turn_off_model``, and off
+    all the rest by ``off_model``. ``gains_most_m_s2``: no rover gains speed faster than this.
     """
 
     dead_s: float = 0.3
@@ -43,6 +43,7 @@ class Following(NamedTuple):
     turn_gain: float = 1.0
     off_model: float = 0.3
     gains_most_m_s2: float = 1.3
+    turn_off_model: float = 0.3
 
 
 def alone_s(lasts_s: float) -> float:
@@ -52,7 +53,7 @@ def alone_s(lasts_s: float) -> float:
 
 def turn_gains(follows: Following, lasts_s: float) -> tuple[float, ...]:
     """By which factors more than told a rover may turn, where a velocity lasts so long."""
-    off = follows.off_model + LONG_OFF * min(alone_s(lasts_s) / LONG_ALONE_S, 1.0)
+    off = follows.turn_off_model + LONG_OFF * min(alone_s(lasts_s) / LONG_ALONE_S, 1.0)
     return 1.0 + off, 1.0 - off, 1.0
 
 
@@ -77,7 +78,7 @@ def following_of(settings: MotionSettings, parameters: Mapping[str, float]) -> F
         usual_deg_s2 = math.degrees(usual.turn_acceleration_rad_s2)
         turns = math.radians(_believed(parameters, TURN_ACCELERATION, usual_deg_s2, math.degrees(BELIEVED_RAD_S2)))
     off = settings.off_model
-    return Following(settings.dead_s, gains, brakes, turns, settings.turn_gain, off, most_m_s2 * (1.0 + off))
+    return Following(settings.dead_s, gains, brakes, turns, settings.turn_gain, off, most_m_s2 * (1.0 + off), off)
 
 
 def turns_are_limited(settings: MotionSettings, parameters: Mapping[str, float]) -> bool:

@@ -2,8 +2,8 @@
 
 This is the last look's own reckoning of ways and of what stands there: it asks each cell of the evidence map under the
 outline, not a field of distances or a line, and follows the rover in steps of its own. So an error in that is not
-repeated here. What is known of the rover (``Following``) and what it was told it has from where the controllers have
-it. It is a little milder, so that it speaks only where something is wrong.
+repeated here. What is known of the rover (``Following``), how far it may turn off that (``turn_gains``) and what it was
+told it has from where the controllers have it. It is a little milder, so that it speaks only where something is wrong.
 
 Nouns: left alone.
 """
@@ -38,9 +38,9 @@ cells make ways differ by as much."""
 AWAY_M, AWAY = 0.02, 0.1
 """A rover whose outline lies deeper over something may get so much deeper, so that it gets away; but with each metre it
 must get out of it by the second."""
-UNDER_M, BESIDE = 0.3, 2.0
+UNDER_M, BESIDE = 0.1, 1.5
 """No sensor sees the ground on which the rover can turn and so much round it, nor what lies that many times its half
-width beside it."""
+width, and so much, beside it: a lidar of 90 degrees sees little of that where a rover begins."""
 
 CORNER = 0.75
 """A rover at the border of its field may cut the corner of a closed one within this share of a field's side."""

@@ -53,7 +53,8 @@ MOST_ERROR = 3.0
 PULL = 0.01
 """How much figures are drawn to what they began with, so that they stay where nothing tells."""
 KNOWN_S = 2.5
-"""So long the rover must have gathered speed, braked, and changed its turn rate before the model counts as known."""
+"""So long the rover must have gathered speed, braked, and changed its turn rate before the model counts as known; so
+long it must have turned steadily before it is known how far it turns."""
 POOR_FIT = 2.0
 """A mean squared difference from which what was known is doubted again."""
 
@@ -71,18 +72,26 @@ class Fit(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ModelEstimate:
-    """``began``: what was assumed at first. ``figures``: found since. The seconds: each kind of motion seen so far."""
+    """``began``: what was assumed at first. ``figures``: found since. The seconds: each kind of motion seen so far;
+    ``steady_s``: of turning steadily.
+    """
 
     began: Following
     figures: Following
     gathered_s: float = 0.0
     braked_s: float = 0.0
     turned_s: float = 0.0
+    steady_s: float = 0.0
 
     @property
     def known(self) -> float:
         """From 0, nothing is known, to 1."""
         return min(1.0, min(self.gathered_s, self.braked_s, self.turned_s) / KNOWN_S)
+
+    @property
+    def turn_known(self) -> float:
+        """The same of how far it turns: only steady turns tell that."""
+        return min(self.known, self.steady_s / KNOWN_S)
 
     def following(self, off_model_known: float) -> Following:
         """The figures, and how far the rover may be off them: the less, the more is known, down to that share.
@@ -91,11 +100,21 @@ class ModelEstimate:
         (``gains_most_m_s2`` at first, but for the doubt in it) remains possible.
         """
         doubted = self.began.off_model
-        off = doubted - self.known * max(doubted - off_model_known, 0.0)
+        most_known = max(doubted - off_model_known, 0.0)
+        off, turn_off = doubted - self.known * most_known, doubted - self.turn_known * most_known
         most_m_s2 = self.began.gains_most_m_s2
         possible_m_s2 = self.known * most_m_s2 / (1.0 + doubted) + (1.0 - self.known) * most_m_s2
         most_m_s2 = max(self.figures.acceleration_m_s2 * (1.0 + off), possible_m_s2)
-        return self.figures._replace(off_model=off, gains_most_m_s2=most_m_s2)
+        return self.figures._replace(off_model=off, turn_off_model=turn_off, gains_most_m_s2=most_m_s2)
+
+
+def bounded(figures: Following, began: Following) -> Following:
+    """Figures that come from a file, within the bounds round what the estimate began with."""
+    kept = {}
+    for name in ("dead_s", *FIGURES):
+        usual = getattr(began, name)
+        kept[name] = min(max(getattr(figures, name), LEAST_SHARE * usual), MOST_SHARE * usual)
+    return began._replace(**kept)
 
 
 def described(estimate: ModelEstimate) -> str:
@@ -104,7 +123,7 @@ def described(estimate: ModelEstimate) -> str:
     return (
         f"after {own.dead_s:.2f} s, gains {own.acceleration_m_s2:.2f} and loses {own.deceleration_m_s2:.2f} m/s², "
         f"turns {own.turn_gain:.2f} times as told, changes that by {own.turn_acceleration_rad_s2:.1f} rad/s² "
-        f"({estimate.known:.0%} known)"
+        f"({estimate.known:.0%} known, how far it turns {estimate.turn_known:.0%})"
     )
 
 
@@ -181,12 +200,14 @@ def _fitted(before: ModelEstimate, rows: NDArray[np.float64], *, limited: bool) 
         return replace(
             before, figures=best,
             gathered_s=0.5 * before.gathered_s, braked_s=0.5 * before.braked_s, turned_s=0.5 * before.turned_s,
+            steady_s=0.5 * before.steady_s,
         )  # fmt: skip
     return replace(
         before, figures=best,
         gathered_s=min(before.gathered_s + fit.gathers_s, KNOWN_S),
         braked_s=min(before.braked_s + fit.brakes_s, KNOWN_S),
         turned_s=min(before.turned_s + fit.turns_s, KNOWN_S),
+        steady_s=min(before.steady_s + fit.steady_s, KNOWN_S),
     )  # fmt: skip
 
 
@@ -202,7 +223,7 @@ def fit_of(figures, rows, since_s):
     """The values of a ``Fit``.
 
     ``rows``: shape (n, 5), time, speed and turn rate told since the row before, speed and turn rate seen;
-    ``since_s``: the three kinds of motion are counted from then on.
+    ``since_s``: the kinds of motion are counted from then on.
     """
     speed, turn, at, counted = rows[0, 3], rows[0, 4], 0, 0
     error = gathers_s = brakes_s = turns_s = steady_s = 0.0

@@ -187,6 +187,9 @@ class MotionController:
         self._standstill.note(view)
         self._note_way(view, passed_s)
         problem = self._problem(path, view, model)
+        assert self._window is not None
+        if not self._window.is_known:  # the first scan is still to come
+            return stop_for(Purpose.BLOCKED)
         later = problem._replace(
             start=problem.start._replace(speed_m_s=view.shoots_m_s),
             model=worst_model(model, view.following),
@@ -200,7 +203,6 @@ class MotionController:
         found = self._planner.plan(problem, passed_s)
         told = self._against_roll(self._safe(found.motion[0], view, worst), view, worst)
         self._standstill.told(told.speed_m_s, view, guarded=_is_guarded(view))
-        assert self._window is not None
         ahead = self._position.faster_than(told.speed_m_s, path, view)
         self.choice = MotionChoice(now_s, problem, found, told, self._window.corner, self._outline, ahead)
         if ahead is not None:

@@ -56,10 +56,11 @@ COARSE = 2
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Window:
-    """The rasters, and where their south-west corner lies."""
+    """The rasters, and where their south-west corner lies. ``is_known``: something is known there."""
 
     ground: MotionGround
     corner: NedPoint
+    is_known: bool
 
     def place(self, point: NedPoint) -> tuple[float, float]:
         """Metres east and north of the corner."""
@@ -121,7 +122,7 @@ def look_round(
         if last * STEP_M >= NEARER_M:
             togo_s, ends = cost_to_go(pace, cells[last : last + 1]), False
     ground = MotionGround(gap_m, seen_m, cell_m, togo_s, COARSE * cell_m, ends)
-    return Window(ground, evidence.frame.point(left, low))
+    return Window(ground, evidence.frame.point(left, low), not unseen.all())
 
 
 def _around(evidence: EvidenceMap, here: NedPoint, first: tuple[int, int], pace: Floats) -> NDArray[np.int64]:

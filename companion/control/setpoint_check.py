@@ -3,7 +3,8 @@
 A setpoint may be the last one that the autopilot receives, and it is followed to its end. So each one is asked
 whether the rover may be left alone with it. One that may not is replaced by velocity zero, reported and counted.
 That this never happens is the task of the controllers. What lies on the way is reckoned anew, in ``left_alone``; only
-the formulas of how far the rover goes beyond a point, and brakes, are those of the controllers.
+the formulas of how far the rover goes beyond a point, and brakes, and by how much it may turn more or less than told
+are those of the controllers.
 
 Nouns: setpoint check.
 """

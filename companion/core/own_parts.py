@@ -106,6 +106,22 @@ def source_of(kind: OwnKind, name: str) -> Path | None:
     return None if file is None else Path(file)
 
 
+def sources_of(kind: OwnKind, name: str) -> tuple[Path, ...]:
+    """The file that an own part comes from, and those that it may import: all of its package, or those beside it.
+
+    Of a module that is installed without a package only its own file.
+    """
+    file = source_of(kind, name)
+    if file is None:
+        return ()
+    folder, is_package = file.parent, (file.parent / "__init__.py").exists()
+    if not is_package and folder.name in ("site-packages", "dist-packages"):
+        return (file,)
+    while is_package and (folder.parent / "__init__.py").exists():
+        folder = folder.parent
+    return tuple(sorted({file, *(folder.rglob("*.py") if is_package else folder.glob("*.py"))}))
+
+
 def raised(kind: OwnKind, name: str, error: BaseException) -> str:
     """An error in one line, with the last line of the own part's file that led to it, where there is one."""
     try:

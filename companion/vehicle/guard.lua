@@ -10,7 +10,7 @@ local COMPANION = 191
 local GUIDED, HOLD = 15, 4
 local HEARTBEAT = 0
 local SETPOINTS = { [73] = true, [75] = true, [84] = true, [86] = true }
-local SET_MODE, COMMAND_INT, COMMAND_LONG, DO_SET_MODE = 11, 75, 76, 176
+local SET_MODE, COMMAND_INT, COMMAND_LONG, DO_SET_MODE, DO_AUX_FUNCTION = 11, 75, 76, 176, 218
 local SWITCHED_US = 100
 
 local own = param:get("MAV_SYSID") or param:get("SYSID_THISMAV")
@@ -27,7 +27,8 @@ end
 local function asks_for_mode(message, id)
   if id == SET_MODE then return true end
   if (id ~= COMMAND_INT and id ~= COMMAND_LONG) or #message < 42 then return false end
-  return string.unpack("<I2", message, 41) == DO_SET_MODE
+  local command = string.unpack("<I2", message, 41)
+  return command == DO_SET_MODE or command == DO_AUX_FUNCTION
 end
 
 local function mode_switch_us()

@@ -1,7 +1,7 @@
 """The guard script of rover-companion, as it runs on the autopilot: HOLD when the companion falls silent.
 
 In the simulator it is there when SCR_ENABLE is 1 at boot, and SCR_USER1 is set or the script was uploaded. It does what
-the script ``companion/vehicle/guard.lua`` does, which looks every 20 ms.
+the script ``companion/vehicle/guard.lua`` does, which looks every 20 ms; but there is no mode switch here to look at.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ SETPOINTS = {
 }
 LIFE = {"HEARTBEAT", *SETPOINTS}
 COMMANDS = {"COMMAND_INT", "COMMAND_LONG"}
+OF_A_MODE = (mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_DO_AUX_FUNCTION)
 LOOK_US = 20_000
 TELL_US = 500_000
 USUAL_MS, LEAST_MS, MOST_MS = 300.0, 200.0, 3000.0
@@ -95,9 +96,9 @@ class Guard:
 
 
 def _asks_for_mode(message: Any) -> bool:
-    """Whether somebody wants a mode: whatever he wants, HOLD is his from then on."""
+    """Whether somebody wants a mode, or to turn an auxiliary switch, which may be one: HOLD is his from then on."""
     name = message.get_type()
-    return name == "SET_MODE" or (name in COMMANDS and message.command == mavlink.MAV_CMD_DO_SET_MODE)
+    return name == "SET_MODE" or (name in COMMANDS and message.command in OF_A_MODE)
 
 
 def guard_of(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool]) -> Guard | None:

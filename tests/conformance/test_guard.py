@@ -40,6 +40,7 @@ SETPOINT = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 8, 151
 LIFE = mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 0, 3)
 OTHER = mavlink.MAVLink_timesync_message(0, 1)
 HOLD_LONG = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_DO_SET_MODE, 0, 1, 4, 0, 0, 0, 0, 0)
+HOLD_AUX = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_DO_AUX_FUNCTION, 0, 54, 2, 0, 0, 0, 0, 0)
 HOLD_INT = mavlink.MAVLink_command_int_message(1, 1, 0, mavlink.MAV_CMD_DO_SET_MODE, 0, 0, 1, 4, 0, 0, 0, 0, 0)
 HOLD_SET = mavlink.MAVLink_set_mode_message(1, 1, 4)
 ARM = mavlink.MAVLink_command_long_message(1, 1, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0)
@@ -188,7 +189,7 @@ def test_while_hold_is_refused_the_simulators_guard_looks_every_20_ms_and_no_soo
     assert there.guard.due_us() == there.vehicle.time_us + LOOK_US
 
 
-@pytest.mark.parametrize("message", [HOLD_LONG, HOLD_INT, HOLD_SET])
+@pytest.mark.parametrize("message", [HOLD_LONG, HOLD_INT, HOLD_SET, HOLD_AUX])
 def test_a_hold_that_a_person_asks_for_as_well_is_not_its_doing_any_more(guard: Guards, message: Any) -> None:
     """The mode does not change, but a companion that is resumed must not take the rover from him."""
     looks(guard, 0.5, 0.1, packed(SETPOINT))

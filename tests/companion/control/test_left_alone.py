@@ -138,10 +138,23 @@ def test_ground_that_was_not_seen_counts_but_not_where_no_sensor_sees_it() -> No
     assert fault(GuidedVelocity(0.3, 0.4), view(evidence)) is None
 
 
+@pytest.mark.parametrize(("body", "most_m_s"), [(Footprint.circle(0.35), 0.5), (LONG, 0.35)])
+def test_of_ground_that_nobody_ever_saw_only_what_lies_round_the_rover_is_driven_over(
+    body: Footprint, most_m_s: float
+) -> None:
+    """Where planning went wrong, it may roll on at a crawl, and no faster."""
+    evidence = open_ground()
+    evidence.log_odds.fill(0.0)
+    assert fault(GuidedVelocity(0.15, 0.0), view(evidence, 0.15, body)) is None
+    fast = fault(GuidedVelocity(most_m_s, 0.0), view(evidence, most_m_s, body))
+    assert fast is SetpointFault.ONTO_UNSEEN
+
+
 def test_a_turn_that_comes_out_larger_than_told_is_counted_on() -> None:
     """At 1.5 m/s, 0.5 rad/s: the post lies beside the way as told, and on that of a rover that turns 1.3 times more."""
     at = view(open_ground(), 1.5)
-    as_told, more = (first_met_with(replace(at, following=at.following._replace(off_model=off))) for off in (0.0, 0.3))
+    follows = (at.following._replace(off_model=off, turn_off_model=off) for off in (0.0, 0.3))
+    as_told, more = (first_met_with(replace(at, following=one)) for one in follows)
     assert as_told is None and more is SetpointFault.INTO_OBSTACLE
 
 
@@ -274,7 +287,8 @@ def test_what_passes_is_free_under_the_outline_in_shapes(
     if speed_m_s * forward_m_s < 0.0 and any(first_met(way, at) is not Met.NOTHING for way in stops):
         ways = [once_turned_back(way, told, at) for way in ways]
     unseen = shapely.points((np.argwhere(evidence.log_odds == 0.0)[:, ::-1] + 0.5) * CELL_M)
-    far = unseen[shapely.distance(unseen, shapely.Point(MIDDLE, MIDDLE)) > body.radius_m + 0.8]
+    around_m = max(body.radius_m, 1.5 * body.half_width_m) + 0.12
+    far = unseen[shapely.distance(unseen, shapely.Point(MIDDLE, MIDDLE)) > around_m]
     for way in ways:
         assert first_met(way, at) is Met.NOTHING
         if shapely.intersects(shape(body, *way[0, :3]).buffer(-0.05), standing).any():

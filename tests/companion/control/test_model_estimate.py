@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from companion.control import model_estimate
-from companion.control.following import AS_SHIPPED, Following, following_of, turns_are_limited
+from companion.control.following import AS_SHIPPED, Following, following_of, turn_gains, turns_are_limited
 from companion.control.local_view import LocalView
-from companion.control.model_estimate import GAP_S, KNOWN_S, ModelEstimate, ModelEstimator, described
+from companion.control.model_estimate import GAP_S, KNOWN_S, ModelEstimate, ModelEstimator, bounded, described
 from companion.control.told import Told, after
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
@@ -27,7 +27,13 @@ EVIDENCE, SETTINGS, LIMITS = ground(), Settings(), RoverLimits(0.4, 2.0, 8.0)
 
 
 def watched(
-    rover: Following, seconds: float, seed: int = 0, noise: float = 0.02, told: bool = True, limited: bool = False
+    rover: Following,
+    seconds: float,
+    seed: int = 0,
+    noise: float = 0.02,
+    told: bool = True,
+    limited: bool = False,
+    most_rad_s: float = 1.5,
 ) -> ModelEstimator:
     """What is found of a rover that is told other speeds and turn rates every half second."""
     estimator, rng = ModelEstimator(AS_SHIPPED), np.random.default_rng(seed)
@@ -37,7 +43,7 @@ def watched(
     for tick in range(round(seconds / TICK_S)):
         now_s = tick * TICK_S
         if tick % 10 == 0:
-            setpoint = GuidedVelocity(float(rng.uniform(-0.3, 2.0)), float(rng.uniform(-1.5, 1.5)))
+            setpoint = GuidedVelocity(float(rng.uniform(-0.3, 2.0)), float(rng.uniform(-most_rad_s, most_rad_s)))
         old = history[-max(1, round(rover.dead_s / TICK_S))]
         change, turned = old.forward_m_s - speed, rover.turn_gain * old.yaw_rate_rad_s - turn
         most = TICK_S * (rover.deceleration_m_s2 if change * speed < 0.0 else rover.acceleration_m_s2)
@@ -81,6 +87,27 @@ def test_the_more_is_known_the_less_it_may_be_off() -> None:
     assert shares[0] == AS_SHIPPED.off_model and shares[-1] == pytest.approx(0.1)
 
 
+@pytest.mark.parametrize("gain", [0.7, 1.3])
+def test_a_rover_that_has_hardly_turned_may_turn_by_as_much_off_what_is_told_as_at_first(gain: float) -> None:
+    """Braking and the change of the turn rate are known by then; how far it turns is, once it has turned steadily."""
+    rover = AS_SHIPPED._replace(turn_gain=gain)
+    gentle, turns = (watched(rover, 60.0, most_rad_s=most_rad_s).estimate for most_rad_s in (0.3, 1.5))
+    assert gentle.known == turns.known == 1.0
+    assert (gentle.turn_known, turns.turn_known) == (0.0, 1.0)
+    follows = gentle.following(0.1)
+    assert (follows.off_model, follows.turn_off_model) == pytest.approx((0.1, 0.3))
+    assert min(turn_gains(follows, 0.3)) <= gain / follows.turn_gain <= max(turn_gains(follows, 0.3))
+    assert turns.following(0.1).turn_off_model == pytest.approx(0.1)
+
+
+def test_what_comes_from_a_file_stays_within_the_bounds_of_the_estimate() -> None:
+    wild = Following(50000.0, 900.0, 0.001, 900.0, 50.0, 0.9, 900.0, 0.0)
+    kept = bounded(wild, AS_SHIPPED)
+    assert kept == AS_SHIPPED._replace(
+        dead_s=0.6, acceleration_m_s2=2.0, deceleration_m_s2=0.5, turn_acceleration_rad_s2=4.2, turn_gain=2.0
+    )
+
+
 def test_a_rover_seen_to_gain_little_speed_may_still_gain_as_much_as_its_limit() -> None:
     begun, gentle, quick = (
         watched(AS_SHIPPED._replace(acceleration_m_s2=gains), seconds).estimate.following(0.1).gains_most_m_s2
@@ -119,7 +146,7 @@ def test_moments_that_are_far_apart_do_not_belong_together(monkeypatch: pytest.M
     """A second before a pause and a second after it are too little to learn from."""
     looked = list[int]()
 
-    def fitted(before: ModelEstimate, rows: NDArray[np.float64]) -> ModelEstimate:
+    def fitted(before: ModelEstimate, rows: NDArray[np.float64], *, limited: bool) -> ModelEstimate:
         looked.append(len(rows))
         return before
 

@@ -41,7 +41,7 @@ FOOTPRINT = Footprint.rectangle(0.6, 0.4)
 TICK_S = 0.05
 GUARDED = Settings.model_validate({"guidance": {"controller": "motion-ga", "velocity_lasts_s": 0.3}})
 STRICT = Settings.model_validate({"guidance": {"controller": "motion-ga"}})
-KNOWN = AS_SHIPPED._replace(off_model=0.1)
+KNOWN = AS_SHIPPED._replace(off_model=0.1, turn_off_model=0.1)
 
 
 def view(evidence: EvidenceMap, pose: Pose, speed_m_s: float = 0.0, settings: Settings = GUARDED) -> LocalView:
@@ -168,6 +168,17 @@ def test_ground_that_has_become_unknown_before_it_is_not_driven_onto(settings: S
     assert north_m < ended_m + 0.8
 
 
+@pytest.mark.parametrize("settings", [GUARDED, STRICT])
+def test_before_the_first_scan_it_stands_also_at_the_edge_of_the_map(settings: Settings) -> None:
+    """There it lies over unseen ground already, behind it; that is no leave to drive onto more of it, ahead."""
+    leads, evidence = controller(), ground()
+    evidence.log_odds.fill(0.0)
+    for north_m in (0.2, 3.0):
+        at = view(evidence, Pose(north_m, 10.0, 0.0, 0.0), 0.0, settings)
+        command = leads.follow(PATH, at)
+        assert command.setpoint == GuidedVelocity(0.0, 0.0) and command.purpose is Purpose.BLOCKED
+
+
 def test_a_rover_that_saw_nothing_behind_it_does_not_reverse_there() -> None:
     evidence = ground()
     evidence.log_odds[: round(9.5 / evidence.evidence_m)] = 0.0
@@ -201,6 +212,7 @@ def test_where_it_begins_it_goes_slower_over_ground_that_nobody_saw() -> None:
     assert 0.0 < first_m_s < 0.8 * later_m_s, "its position jumped there, or it drove there"
     assert fastest_m_s(*back, (7.5, 0.0)) == first_m_s, "tail first it saw nothing"
     wall(evidence, 10.0, 9.5, 10.5, 0.0)
+    wall(evidence, 13.0, 7.5, 8.0, -1.0)  # else it would stand
     assert fastest_m_s(*ahead, (12.5, 0.0)) == first_m_s, "the map was begun anew"
 
 
