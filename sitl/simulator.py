@@ -23,7 +23,7 @@ from sitl.autopilot.state import CommandLog, Storage
 from sitl.autopilot.traffic import Traffic
 from sitl.autopilot.vehicle import Vehicle
 from sitl.faults.link_faults import LinkQueue
-from sitl.faults.plan import FaultPlan
+from sitl.faults.plan import FaultPlan, LinkFault
 from sitl.faults.player import FaultPlayer
 from sitl.plant.closed_loop import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.plant.outline import DISC, Outline, OutlinePose, mover_room_m, room_m
@@ -169,6 +169,10 @@ class Simulator:
     def pilot_acts(self) -> bool:
         """Whether a fault has a pilot drive the rover."""
         return self._player.pilot_acts(self.time_s)
+
+    def link_faults(self) -> list[LinkFault]:
+        """Of the fault plan, those that are active."""
+        return self._player.link_faults(self.time_s)
 
     @property
     def drawn_ah(self) -> float:

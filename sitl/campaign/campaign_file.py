@@ -180,6 +180,7 @@ def _check_once(path: Path, folder: Path, table: CampaignTable) -> None:
         "sensors": [SensorSpec.of(sensors) for sensors in table.sensors],
         "faults": [plan if plan == NOTHING else replace(faults_of(plan, folder), source="") for plan in table.faults],
         **{axis: getattr(table, axis) for axis in ("planners", "controllers", "guard", "off_model", "late_s")},
+        "settings": [*table.settings.values()],
     }
     for axis, values in meanings.items():
         if any(value in values[:number] for number, value in enumerate(values)):

@@ -20,6 +20,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.mission.sensor_tables import is_blind
 from companion.recording.recorder import NullRecorder, Recorder
+from companion.safety.reasons import EndReason
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
 from sitl.campaign.policies import ERROR
@@ -218,6 +219,7 @@ def _result(run: Drive, near: Nearest, against_pilot: int, blind_s: float, calle
         refused=report.refused,
         unreachable=statuses[TargetStatus.UNREACHABLE],
         called_wrongly=called_wrongly,
+        left_out=_left_out(run, statuses),
         seconds=round(report.driving_time_s, 2),
         bound_s=0.0 if executor is None else round(time_bound_s(run.mission, run.scenario, executor), 2),
         metres=round(report.distance_m, 2),
@@ -232,6 +234,14 @@ def _result(run: Drive, near: Nearest, against_pilot: int, blind_s: float, calle
         said=report.said[-1][:300] if report.said else "",
         dwelt=_dwelt(report.track),
     )
+
+
+def _left_out(run: Drive, statuses: Counter[TargetStatus]) -> int:
+    """See ``RunResult``. In AUTO the autopilot leads, and may leave a target."""
+    end = run.companion.mission_run.end
+    if end is None or end.kind is not EndReason.DONE or run.mission.in_auto or run.companion.outcome.broken_off:
+        return 0
+    return 0 if statuses[TargetStatus.UNREACHABLE] else statuses[TargetStatus.SKIPPED] + statuses[TargetStatus.PENDING]
 
 
 def _waits_for(run: Drive) -> str:

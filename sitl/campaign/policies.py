@@ -24,6 +24,8 @@ class Policy(StrEnum):
     """The last look at a setpoint finds nothing to refuse: what is planned is what may be told."""
     NO_FALSE_UNREACHABLE = "unreachable-but-free"
     """A target is called unreachable only where no way leads for the rover."""
+    LEAVES_NONE_OUT = "left-out"
+    """A mission ends before its last target only where a target is called unreachable, or the battery is low."""
     PILOT_WINS = "against-pilot"
     """Nothing that moves, arms or switches goes out while the mode is another one or it is disarmed, as was told."""
     NOT_BLIND = "blind"
@@ -39,6 +41,7 @@ def broken(result: RunResult) -> tuple[Policy, ...]:
         Policy.NO_CONTACT: result.touched > 0,
         Policy.NOTHING_REFUSED: result.refused > 0,
         Policy.NO_FALSE_UNREACHABLE: result.called_wrongly > 0,
+        Policy.LEAVES_NONE_OUT: result.left_out > 0,
         Policy.PILOT_WINS: result.against_pilot > 0,
         Policy.NOT_BLIND: result.blind_s > 0.0,
         Policy.ENDS: result.outcome == DriveOutcome.TIME_LIMIT and not result.waits_for,

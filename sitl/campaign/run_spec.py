@@ -79,6 +79,8 @@ class RunResult:
     """Targets that were called unreachable."""
     called_wrongly: int = 0
     """Those of them to which a way leads (``true_ways``)."""
+    left_out: int = 0
+    """Targets that a mission has left out that ended though none was called unreachable and the battery was not low."""
     seconds: float = 0.0
     """Driving time, from the first movement to the last."""
     bound_s: float = 0.0

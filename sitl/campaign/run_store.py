@@ -18,7 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from companion.core.own_parts import OwnKind, looks_own, source_of
+from companion.core.own_parts import OwnKind, looks_own, sources_of
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
@@ -120,7 +120,7 @@ class Digests:
 
 def _libraries() -> str:
     """Of what the code computes with: other versions of these may give other figures."""
-    return " ".join(f"{name} {version(name)}" for name in ("numpy", "numba"))
+    return " ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "shapely"))
 
 
 def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
@@ -129,9 +129,9 @@ def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
         yield from source_files(load_mission(folder / spec.world))
     parts = [(OwnKind.PLANNER, spec.planner), (OwnKind.CONTROLLER, spec.controller)]
     parts += [] if ground is None else [(OwnKind.WORLD, ground.kind)]
-    sources = [source_of(kind, name) for kind, name in parts if looks_own(kind, name)]
     yield from (folder / name for name in (spec.faults, SensorSpec.of(spec.sensors).name) if name.endswith(".toml"))
-    yield from (source for source in sources if source is not None)
+    for kind, name in parts:
+        yield from sources_of(kind, name) if looks_own(kind, name) else ()
 
 
 def _lines(file: Path, *, repair: bool = False) -> list[str]:

@@ -191,8 +191,7 @@ def _paired(these: Partners, others: Partners) -> tuple[str, ...]:
     )  # fmt: skip
     if not both:
         return (f"{len(pairs)}", "-", "-", "-", "-", *counts)
-    seconds = np.array([one[1:] for one in both])
-    mean, other = seconds.mean(axis=0)
+    mean, other = (_by_seed([(one[0], one[at]) for one in both]).mean() for at in (1, 2))
     difference = _by_seed([(seed, a - b) for seed, a, b in both])
     ratio = _by_seed([(seed, math.log(a / b)) for seed, a, b in both if a > 0.0 and b > 0.0])
     apart, times = f"{difference.mean():+.1f}", f"{math.exp(ratio.mean()):.3f}" if len(ratio) else "-"

@@ -37,7 +37,8 @@ COMMAND_AT = slice(38, 40)
 REACTS_S = 0.5
 """A tick, and until motors and wheels follow; the link's delay comes on top, each way."""
 LOSSY_S = 1.0
-"""More, where a fault plan loses packets: a stop is sent five times a second."""
+"""More, where packets are lost or damaged meanwhile: a stop is sent five times a second."""
+LOST = (LinkEffect.LOSS, LinkEffect.CORRUPT)
 BRAKES = 0.7
 """The least share of the autopilot's limit with which a rover brakes that has been told to."""
 ALIVE_S = 0.5
@@ -60,7 +61,7 @@ class WireWatch:
         """So long the rover moved on without range data though it should have braked, or have stood."""
         self._run = run
         self._stale_s = run.settings.safety.stale_s
-        self._reacts_s = REACTS_S + _delay_s(run)
+        self._late_s = self._extra_s = 0.0
         limits = run.scenario.parameters
         usual_m_s2 = limits.get("ATC_ACCEL_MAX", DEFAULTS["ATC_ACCEL_MAX"][0])
         self._brakes_m_s2 = BRAKES * (limits.get("ATC_DECEL_MAX", 0.0) or usual_m_s2)
@@ -89,7 +90,8 @@ class WireWatch:
 
     def _heard(self, time_s: float, data: bytes) -> None:
         """``data``: delivered to the companion."""
-        cut = time_s - self._line_s >= ALIVE_S
+        faults = self._run.simulator.link_faults()
+        cut = time_s - self._line_s >= ALIVE_S or any(fault.effect is LinkEffect.OUTAGE for fault in faults)
         for kind, packet in _packets(data):
             if kind in RANGES:
                 if tells_ahead(kind, packet):
@@ -102,7 +104,9 @@ class WireWatch:
             self._since_s = time_s  # the companion cannot stop the rover, or must not
         if data:
             self._line_s = time_s
-        if self._ranges_s and self._moves_blind(time_s - max(self._ranges_s, self._since_s)):
+        silent_s = time_s - max(self._ranges_s, self._since_s)
+        self._note_link(faults, time_s - self._last_s, silent=silent_s > self._stale_s)
+        if self._ranges_s and self._moves_blind(silent_s):
             self.blind_s += time_s - self._last_s
         self._last_s = time_s
 
@@ -115,6 +119,16 @@ class WireWatch:
                 self._may_take &= self._mode != GUIDED and (self._mode == HOLD or not armed)
                 self._was_armed |= self._may_send
 
+    def _note_link(self, faults: list[LinkFault], passed_s: float, *, silent: bool) -> None:
+        """How much later the companion hears of it, and is heard, because of the link since the ranges fell silent.
+
+        Packets keep their order, so what was late once holds up what is sent after it.
+        """
+        delay_s = math.fsum(fault.delay_s + fault.jitter_s for fault in faults)
+        self._late_s = max(delay_s, self._late_s - passed_s)
+        extra_s = 2.0 * self._late_s + (LOSSY_S if any(fault.effect in LOST for fault in faults) else 0.0)
+        self._extra_s = max(extra_s, self._extra_s) if silent else extra_s
+
     def _moves_blind(self, silent_s: float) -> bool:
         """Whether it is faster than a rover that brakes once it has had time to react.
 
@@ -123,20 +137,12 @@ class WireWatch:
         if silent_s <= self._stale_s:
             self._fastest_m_s = 0.0
             return False
-        speed_m_s, braked_s = abs(self._run.simulator.truth.speed_m_s), silent_s - self._stale_s - self._reacts_s
+        speed_m_s = abs(self._run.simulator.truth.speed_m_s)
+        braked_s = silent_s - self._stale_s - REACTS_S - 2.0 * self._run.late_s - self._extra_s
         if braked_s <= 0.0:
             self._fastest_m_s = max(self._fastest_m_s, speed_m_s)
             return False
         return speed_m_s > max(self._fastest_m_s - self._brakes_m_s2 * braked_s, MOVES_M_S)
-
-
-def _delay_s(run: Drive) -> float:
-    """How much later the companion hears of it, and is heard: by the link, and by the fault plan."""
-    faults = () if run.scenario.faults is None else run.scenario.faults.faults
-    of_link = [fault for fault in faults if isinstance(fault, LinkFault)]
-    late_s = math.fsum(fault.delay_s + fault.jitter_s for fault in of_link)
-    lossy = any(fault.effect in (LinkEffect.LOSS, LinkEffect.CORRUPT) for fault in of_link)
-    return 2.0 * (run.late_s + late_s) + (LOSSY_S if lossy else 0.0)
 
 
 def _packets(data: bytes) -> Iterator[tuple[int, bytes]]:

@@ -89,7 +89,7 @@ class GroundSpec:
             return None
         kind, values = Worded.of(text)
         movers = values.pop("movers", 0)
-        if not isinstance(movers, int) or not 0 <= movers <= MOST_MOVERS:
+        if isinstance(movers, bool) or not isinstance(movers, int) or not 0 <= movers <= MOST_MOVERS:
             raise ValueError(f"movers={movers}: give a whole number from 0 to {MOST_MOVERS}")
         east_m = values.pop("target_east_m", ACROSS_M)
         if isinstance(east_m, bool | str) or not NEAREST_TARGET_M <= east_m <= ACROSS_M:
@@ -166,7 +166,7 @@ def faults_of(text: str, folder: Path) -> FaultPlan:
 def _valid(model: type[Model], values: dict[str, Any]) -> Model:
     """Raises ValueError with one line that names what there is."""
     try:
-        return model.model_validate(values)
+        return model.model_validate(values, strict=True)
     except ValidationError as error:
         reason = " ".join(describe_first(error, model).split())
         known = "" if "known here" in reason else f"; known here: {', '.join(model.model_fields)}"

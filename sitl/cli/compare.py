@@ -89,7 +89,10 @@ def _load(file: Path) -> None:
 
 def _campaign(missions: list[Path], folder: Path, planners: str, controllers: str, seeds: int) -> str:
     """The campaign's file in a folder; a list of strings is written alike in JSON and TOML."""
-    worlds = [os.path.relpath(one, folder) if _is_file(one) else str(one) for one in missions]
+    there = folder.resolve()  # the way back from a folder behind a link begins where that leads
+    worlds = [
+        os.path.relpath(one.parent.resolve() / one.name, there) if _is_file(one) else str(one) for one in missions
+    ]
     lists = {"worlds": worlds, "planners": names_in(planners), "controllers": names_in(controllers)}
     lines = [f"{key} = {json.dumps(values, ensure_ascii=False)}" for key, values in lists.items()]
     return "\n".join(['name = "compare"', *lines, f"runs = {seeds}"]) + "\n"

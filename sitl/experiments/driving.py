@@ -244,12 +244,10 @@ def _row(own: Sequence[Series], reference_s: Times, known_s: Times, bounds_s: Ti
     times_s, reports = together(own), [report for one in own for report in one.reports]
     searches = sum(report.searches for report in reports)
     curves = sum(report.genetic_searches for report in reports)
-    pairs = np.column_stack((times_s, reference_s))
-    pairs = pairs[~np.isnan(pairs).any(axis=1)]
     return [
         own[0].name,
         mean_with_interval(times_s[~np.isnan(times_s)], digits=1),
-        "1" if own[0].name == REFERENCE else ratio_with_interval(pairs),
+        "1" if own[0].name == REFERENCE else _quotient(times_s, reference_s),
         *(_quotient(times_s, other_s) for other_s in (known_s, bounds_s)),
         f"{np.mean([report.distance_m for report in reports]):.1f}",
         f"{np.mean([report.return_steps for report in reports]):.1f}",
@@ -268,9 +266,14 @@ def _mean(values: Times) -> float:
 
 
 def _quotient(times_s: Times, others_s: Times) -> str:
-    """One mean over the other, of the seeds that both have: where only easy ones were driven to their end, of those."""
-    both = ~np.isnan(times_s + others_s)
-    return f"{times_s[both].mean() / others_s[both].mean():.3f}" if both.any() else "-"
+    """One mean over the other, with its interval: of those seeds alone with which both were driven to their end."""
+    return ratio_with_interval(_both(times_s, others_s))
+
+
+def _both(times_s: Times, others_s: Times) -> NDArray[np.float64]:
+    """Shape (n, 2): of the seeds that both have."""
+    pairs = np.column_stack((times_s, others_s))
+    return pairs[~np.isnan(pairs).any(axis=1)]
 
 
 def shortfalls(series: tuple[Series, ...]) -> str:
@@ -279,8 +282,9 @@ def shortfalls(series: tuple[Series, ...]) -> str:
     slower, longer = [], []
     for one in (s for s in own.values() if s.planner == OURS):
         reference = own.get((REFERENCE, one.course))
-        if reference is not None and one.time_s > reference.time_s:
-            slower.append(f"{one.course} ({one.time_s / reference.time_s:.3f})")
+        times_s = np.empty((0, 2)) if reference is None else _both(one.times_s, reference.times_s)
+        if len(times_s) and (ratio := times_s[:, 0].mean() / times_s[:, 1].mean()) > 1.0:
+            slower.append(f"{one.course} ({ratio:.3f})")
         steps = own.get((STEPS_REFERENCE, one.course))
         if steps is not None and one.steps > STEPS_FACTOR * steps.steps:
             longer.append(f"{one.course} ({one.steps / steps.steps:.3f})")

@@ -297,6 +297,10 @@ class FaultPlayer:
 
     # Links -----------------------------------------------------------------------------------------------------------
 
+    def link_faults(self, now_s: float) -> list[LinkFault]:
+        """Those that are active."""
+        return [fault for fault, _ in self._links if self.is_active(fault, now_s)]
+
     def pass_on(self, queue: LinkQueue, data: bytes, now_s: float) -> None:
         """Put bytes on their queue through a link with its faults."""
         queue.pass_on(data, now_s, lambda fault: self.is_active(fault, now_s), self._links)

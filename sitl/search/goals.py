@@ -26,7 +26,7 @@ class Goal(StrEnum):
     CLEARANCE = "clearance"
     """It comes nearer to something than 5 cm."""
     STUCK = "stuck"
-    """There is a way, it waits for nothing, and it does not come to the target within the time limit."""
+    """There is a way, it waits for nothing, and it does not come to the target within the time limit, or leaves it."""
     UNREACHABLE = "unreachable-but-free"
     """There is a way, and the target is called unreachable."""
     REFUSED = "refused"
@@ -62,8 +62,8 @@ def shows(goal: Goal, result: RunResult) -> bool:
         return POLICIES[goal] in broken(result)
     if goal == Goal.CLEARANCE:
         return result.clearance_m < TOO_NEAR_M
-    ended = result.outcome != DriveOutcome.TIME_LIMIT or result.waits_for != ""
-    return _has_way(result) and result.unreachable == 0 and not ended
+    late = result.outcome == DriveOutcome.TIME_LIMIT and result.waits_for == ""
+    return _has_way(result) and result.unreachable == 0 and (late or result.left_out > 0)
 
 
 def distance(goal: Goal, result: RunResult) -> float:

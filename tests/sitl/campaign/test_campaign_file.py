@@ -46,6 +46,10 @@ def test_each_combination_is_one_run_for_each_seed_and_seeds_come_one_after_the_
         ('worlds = ["yard"]\ncontrollers = ["feet"]', "controllers"),
         ('worlds = ["yard", "yard"]', "worlds: a value stands there twice"),
         ('worlds = ["rooms movers=0", "rooms  "]', "worlds: a value stands there twice"),
+        (
+            'worlds = ["yard"]\n[settings.a.guidance]\nclearance_m = 0.2\n[settings.b.guidance]\nclearance_m = 0.2',
+            "settings: a value stands there twice",
+        ),
         ('worlds = ["c.toml", "./c.toml"]', "worlds: a value stands there twice"),
         ('worlds = ["yard"]\nsensors = ["beams", " beams"]', "sensors: a value stands there twice"),
         (

@@ -62,6 +62,10 @@ def gives_up_at_once(patch: Patch) -> None:
     patch.setattr(executor, "on_time", gives_up)
 
 
+def ends_the_mission_at_once(patch: Patch) -> None:
+    patch.setattr(executor, "on_time", lambda progress, now_s: ended_early(progress))
+
+
 def obeys_no_pilot(patch: Patch) -> None:
     patch.setattr(latch, "latched", lambda control, vehicle: latch.Control.COMPANION)
 
@@ -81,17 +85,23 @@ def _patient(safety: Any, stale_s: float) -> Any:
 
 
 def says_nothing(patch: Patch) -> None:
-    patch.setattr(SetpointSender, "speak", lambda self, command, now_s: None)
+    patch.setattr(SetpointSender, "speak", lambda *given, **named: None)
 
 
 MUTANTS: list[tuple[Callable[[Patch], None], str, Policy]] = [
     (gives_up_at_once, "none", Policy.NO_FALSE_UNREACHABLE),
     (ends_with_an_error, "none", Policy.NO_ERROR),
+    (ends_the_mission_at_once, "none", Policy.LEAVES_NONE_OUT),
     (sees_nothing, "none", Policy.NO_CONTACT),
     (looks_only_at_the_last_moment, "none", Policy.NOTHING_REFUSED),
     (obeys_no_pilot, "pilot start_s=2 since=driving mode=MANUAL", Policy.PILOT_WINS),
     (never_notices_silence, "sensor_silent start_s=2 since=driving duration_s=3", Policy.NOT_BLIND),
     (notices_silence_too_late, "sensor_silent start_s=2 since=driving duration_s=6", Policy.NOT_BLIND),
+    (
+        notices_silence_too_late,
+        "sensor_silent start_s=2 since=driving duration_s=6; packet_delay start_s=500 duration_s=1 delay_s=1.5",
+        Policy.NOT_BLIND,
+    ),
     (says_nothing, "none", Policy.ENDS),
 ]
 

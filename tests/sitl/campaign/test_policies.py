@@ -22,6 +22,7 @@ FINE = RunResult("points", "reached", 1, 1, seconds=31.25, bound_s=20.0, clearan
         ({"refused": 1}, (Policy.NOTHING_REFUSED,)),
         ({"unreachable": 1, "reached": 0, "outcome": "incomplete"}, ()),
         ({"unreachable": 2, "called_wrongly": 1, "reached": 0, "bound_s": 0.0}, (Policy.NO_FALSE_UNREACHABLE,)),
+        ({"left_out": 1, "reached": 0, "outcome": "incomplete"}, (Policy.LEAVES_NONE_OUT,)),
         ({"against_pilot": 1}, (Policy.PILOT_WINS,)),
         ({"blind_s": 0.05}, (Policy.NOT_BLIND,)),
         ({"outcome": "time limit"}, (Policy.ENDS,)),

@@ -126,6 +126,24 @@ def test_a_run_depends_on_the_source_of_its_own_controller(tmp_path: Path, monke
     assert together.of(own) == Digests(tmp_path).of(own) != ""
 
 
+def test_a_run_depends_on_what_its_own_part_may_import(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The files beside a module, and all those of a package; nothing of another folder."""
+    for file in ("beside.py", "part_in_file.py", "pack_of_mine/__init__.py", "pack_of_mine/deep/__init__.py"):
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        (tmp_path / file).write_text("class Own: ...\n")
+    monkeypatch.chdir(tmp_path)
+    names = ("part_in_file:Own", "pack_of_mine.deep:Own", "points")
+    specs = [replace(SPECS[0], controller=name) for name in names]
+
+    def changed_by(file: str) -> list[bool]:
+        before = [Digests(tmp_path).of(spec) for spec in specs]
+        (tmp_path / file).write_text((tmp_path / file).read_text() + "# other\n")
+        return [Digests(tmp_path).of(spec) != one for spec, one in zip(specs, before, strict=True)]
+
+    assert changed_by("beside.py") == [True, False, False]
+    assert changed_by("pack_of_mine/__init__.py") == [False, True, False]
+
+
 def test_a_mission_has_no_measures_of_its_ground(tmp_path: Path) -> None:
     store = RunStore(tmp_path / "runs.jsonl", lambda spec: "d")
     store.add(SPECS[0], replace(RESULT, ground=None))

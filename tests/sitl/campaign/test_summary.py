@@ -82,6 +82,23 @@ def test_pairs_of_one_seed_count_as_one() -> None:
     assert of_all.cells[3] == of_one.cells[3] and of_all.cells[0] == "80"
 
 
+def test_the_means_of_a_pair_differ_by_what_the_pair_differs() -> None:
+    """Also where one seed has more complete pairs than another: each seed counts once in every figure."""
+    table = CampaignTable(
+        name="a", worlds=["clutter"], runs=2, controllers=["points", "motion-ga"], planners=["hybrid", "astar"]
+    )
+    seconds = {("hybrid", 0): (60.0, 50.0), ("astar", 0): (80.0, 60.0), ("hybrid", 1): (100.0, 40.0)}
+    runs = [
+        (spec, replace(RESULT, seconds=seconds[spec.planner, spec.seed][spec.controller == "motion-ga"]))
+        for spec in specs_of(table)
+        if (spec.planner, spec.seed) in seconds
+    ]
+    (pair,) = (one for one in differences(table, runs) if one.axis == "controller")
+    cells = dict(zip(PAIR_HEAD, pair.cells, strict=True))
+    apart_s = float(cells["difference s"].split()[0])
+    assert float(cells["mean s"]) - float(cells["against s"]) == pytest.approx(apart_s) == pytest.approx(-37.5)
+
+
 def test_values_with_one_short_name_stay_apart() -> None:
     table = TABLE.model_copy(update={"worlds": ["a/m.toml", "b/m.toml", "c.toml"], "planners": ["p.q:A", "p.q:B"]})
     assert list(labels(table, "world").values()) == ["a/m.toml", "b/m.toml", "c"]

@@ -14,6 +14,7 @@ from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.campaign.wire_watch import WireWatch
 from sitl.campaign.worded import faults_of
+from sitl.faults.plan import LinkEffect, LinkFault
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
 from tests.support.quick import first_of
@@ -71,8 +72,8 @@ def made_up(speed_m_s: float = 0.0, *, in_auto: bool = False) -> Any:
     return SimpleNamespace(
         clock=SimpleNamespace(overhear=None, delivered=None),
         settings=Settings(),
-        simulator=SimpleNamespace(truth=SimpleNamespace(speed_m_s=speed_m_s)),
-        scenario=SimpleNamespace(parameters={}, faults=None),
+        simulator=SimpleNamespace(truth=SimpleNamespace(speed_m_s=speed_m_s), link_faults=list),
+        scenario=SimpleNamespace(parameters={}),
         mission=SimpleNamespace(in_auto=in_auto),
         late_s=0.0,
     )
@@ -130,6 +131,35 @@ def test_a_rover_has_the_time_that_braking_takes(brakes_m_s2: float, is_blind: b
         run.simulator.truth.speed_m_s = max(0.0, 1.5 - brakes_m_s2 * max(0.0, time_s - 2.5))
         heard_by(watch, time_s, beat(15), *([AHEAD] if 0.0 < time_s <= 1.0 else []))
     assert (watch.blind_s > 0.0) == is_blind
+
+
+DELAY = LinkFault(effect=LinkEffect.DELAY, delay_s=1.0)
+OUTAGE = LinkFault(effect=LinkEffect.OUTAGE, direction="to_vehicle")
+
+
+@pytest.mark.parametrize(
+    ("fault", "from_s", "to_s", "blind_s"),
+    [
+        (DELAY, 0.0, 0.0, 7.5),
+        (DELAY, 0.0, 1.5, 6.5),
+        (DELAY, 2.2, 2.4, 5.5),
+        (DELAY, 0.0, 10.0, 5.5),
+        (LinkFault(effect=LinkEffect.LOSS, probability=0.3), 2.2, 2.4, 6.5),
+        (OUTAGE, 0.0, 6.0, 2.5),
+    ],
+    ids=["none", "over, its packets come", "meanwhile", "all the time", "lost meanwhile", "no stop arrives"],
+)
+def test_a_late_or_lossy_link_leaves_more_time_while_it_is_so(
+    fault: LinkFault, from_s: float, to_s: float, blind_s: float
+) -> None:
+    """Range data ends after 1 s, as above; each way takes a second more, at most, while and after the link is late."""
+    run = made_up(1.0)
+    watch, now_s = WireWatch(run), 0.0
+    run.simulator.link_faults = lambda: [fault] if from_s <= now_s < to_s else []
+    for tick in range(201):
+        now_s = 0.05 * tick
+        heard_by(watch, now_s, beat(15), *([ROUND] if 0.0 < now_s <= 1.0 else []))
+    assert watch.blind_s == pytest.approx(blind_s, abs=0.11)
 
 
 def test_a_rover_that_gets_its_line_back_has_the_time_to_stop() -> None:

@@ -39,6 +39,8 @@ def test_faults_one_after_the_other(tmp_path: Path) -> None:
         ("rooms target_east_m=5", "target_east_m=5: give metres from 6 to 38"),
         ("rooms target_east_m=near", "target_east_m=near: give metres from 6 to 38"),
         ("rooms target_east_m=true", "target_east_m=True: give metres from 6 to 38"),
+        ("rooms movers=true", "movers=True: give a whole number from 0 to 50"),
+        ("clutter least_things=true", "least_things"),
         ("rooms movers=many", "movers=many: give a whole number from 0 to 50"),
         ("rooms least_door_m=0.2", "least_door_m"),
         ("rooms door_m=2", "known here: least_door_m, most_door_m, room_m"),

@@ -89,7 +89,9 @@ def test_a_planner_that_reached_only_the_easy_targets_is_compared_on_those_alone
 
     both = (series("theta-star", [20.0, 60.0]), series("theta-star", [15.0, 50.0], known=True))
     report = DrivingReport(Options(runs=2), (series("prm", [20.0, math.nan]), *both))
-    rows = {row[0]: row[1:5] for row in report._rows("a")}
+    told = {row[0]: row[1:5] for row in report._rows("a")}
+    assert told["theta-star"][2] == "1.231 (1.200 to 1.333)"
+    rows = {name: [cell.partition(" (")[0] for cell in row] for name, row in told.items()}
     assert rows["prm"] == ["20.0", "1.000", "1.333", "2.000"]
     assert rows["theta-star"][2:] == ["1.231", "2.667"] and rows["bound"] == ["15.0", "0.375", "0.462", "1.000"]
 
