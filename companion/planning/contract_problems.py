@@ -16,6 +16,7 @@ from companion.planning.problem import Budget, KinematicConstraints, ObstacleTra
 MOST_SIDE = 14
 CROSSING_SIDE = 16
 TURNING_SIDE = 40
+LARGE = (75, 30)
 BUDGET = Budget(min_epochs=2, max_epochs=15, control_points=(4, 6), population=18)
 """Short, so that a genetic algorithm's budget is often spent."""
 TURNING_BUDGET = Budget(min_epochs=2, max_epochs=200, control_points=(4, 6), population=30)
@@ -44,6 +45,17 @@ def random_problem(rng: np.random.Generator) -> PlanningProblem:
         weights[start.y, start.x] = weights[target.y, target.x] = 0.5
     weights.flags.writeable = bool(rng.random() < 0.5)
     return PlanningProblem(weights, start, target, bool(rng.random() < 0.5))
+
+
+def large_problem(rng: np.random.Generator) -> PlanningProblem:
+    """As large as the map of a yard: from one corner to the other past walls with gaps, so that there is a way."""
+    width, height = LARGE
+    weights = np.full((height, width), BASE_WEIGHT)
+    for x in range(12, width - 10, 12):
+        weights[:, x] = 1.0
+        gap = int(rng.integers(height - 4))
+        weights[gap : gap + 4, x] = BASE_WEIGHT
+    return PlanningProblem(weights, Cell(0, 0), Cell(width - 1, height - 1))
 
 
 def crossing_problem(rng: np.random.Generator) -> PlanningProblem:

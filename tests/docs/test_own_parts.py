@@ -127,6 +127,33 @@ def test_a_planner_that_never_finds_a_path_is_told_with_the_first_problem(lines:
 
 
 @pytest.mark.parametrize(
+    ("when", "whose"),
+    [
+        ("Lines.calls > 70", "asked again after the other problems"),
+        ("Lines.calls > 170 and id(self) != Lines.first", "made anew"),
+    ],
+)
+def test_a_planner_that_answers_otherwise_later_is_told(lines: str, when: str, whose: str) -> None:
+    """For each problem it is asked three times: 63 times for 21, and so again twice."""
+    text = Path("lines.py").read_text(encoding="utf-8")
+    late = (
+        "Lines.calls, Lines.first = getattr(Lines, 'calls', 0) + 1, getattr(Lines, 'first', id(self))\n"
+        f"        if {when}: return None, 1, 0, 0\n        fields = poly"
+    )
+    Path("lines.py").write_text(text.replace("fields = poly", late), encoding="utf-8")
+    told = CliRunner().invoke(app, ["check-planner", lines, "--problems", "20"])
+    assert told.exit_code == 3 and f"{whose} it gave another path for the same seed" in told.output, told.output
+
+
+def test_a_planner_that_fails_on_a_large_map_only_is_told(lines: str) -> None:
+    text = Path("lines.py").read_text(encoding="utf-8")
+    fails = "if weights.size > 1000: raise ValueError('too large')\n        fields = poly"
+    Path("lines.py").write_text(text.replace("fields = poly", fails), encoding="utf-8")
+    told = CliRunner().invoke(app, ["check-planner", lines, "--problems", "20"])
+    assert told.exit_code == 3 and "it raised ValueError: too large (lines.py, line " in told.output, told.output
+
+
+@pytest.mark.parametrize(
     ("promise", "wrong", "shown"),
     [
         ("moving_obstacles", "it promises moving_obstacles, and it meets one", "a disc of radius 1.5 fields moves"),
