@@ -70,21 +70,32 @@ def heat_maps(campaign: CampaignTable, runs: Runs, folder: Path) -> list[tuple[s
 def shown_seeds(runs: Runs) -> dict[int, str]:
     """Seeds of generated ground with what they stand for: the one in the middle by time lost, and the one with most.
 
-    Time lost: driving time beyond the bound, the mean of a seed's runs. Only seeds on which all is driven that was
-    driven on any.
+    Time lost: driving time beyond the bound, the mean of a seed's runs. Targets that were not reached come before it:
+    a run that gives up is a short one. Only seeds on which all is driven that was driven on any.
     """
-    lost_s = dict[int, list[float]]()
+    of_seed = dict[int, list[RunResult]]()
     for spec, result in runs:
-        lost_s.setdefault(spec.seed, []).append(result.seconds - result.bound_s)
-    most = max(map(len, lost_s.values()))
-    means_s = {seed: sum(one) / most for seed, one in lost_s.items() if len(one) == most}
-    ordered = sorted(means_s, key=lambda seed: (means_s[seed], seed))
-    middle, last = ordered[(len(ordered) - 1) // 2], ordered[-1]
+        of_seed.setdefault(spec.seed, []).append(result)
+    most = max(map(len, of_seed.values()))
+    all_driven = {seed: one for seed, one in of_seed.items() if len(one) == most}
+    losses = {seed: (_missed(one), _lost_s(one)) for seed, one in all_driven.items()}
+    ordered = sorted(losses, key=lambda seed: (*losses[seed], seed))
+    shown = {ordered[(len(ordered) - 1) // 2]: "the middle", ordered[-1]: "the most"}
     of = f"of {len(ordered)} grounds"
-    return {
-        middle: f"{means_s[middle]:.1f} s beyond the bound, the middle {of}",
-        last: f"{means_s[last]:.1f} s beyond the bound, the most {of}",
-    }
+    return {seed: f"{_loss_told(*losses[seed])}, {rank} {of}" for seed, rank in shown.items()}
+
+
+def _missed(results: Sequence[RunResult]) -> int:
+    return sum(one.targets - one.reached for one in results)
+
+
+def _lost_s(results: Sequence[RunResult]) -> float:
+    return sum(one.seconds - one.bound_s for one in results) / len(results)
+
+
+def _loss_told(missed: int, lost_s: float) -> str:
+    targets = f"{missed} target{'s' if missed > 1 else ''} not reached, " if missed else ""
+    return f"{targets}{lost_s:.1f} s beyond the bound"
 
 
 def _panels(campaign: CampaignTable, runs: Runs) -> dict[str, Sequence[RunResult]]:

@@ -62,6 +62,16 @@ def test_a_ground_on_which_not_all_is_driven_yet_is_not_shown() -> None:
     assert list(shown_seeds(runs)) == [0, 1] and list(shown_seeds(runs[:-1])) == [0]
 
 
+def test_a_ground_on_which_a_run_gave_up_is_not_taken_for_an_easy_one() -> None:
+    table = CampaignTable(name="c", worlds=["rooms"], runs=3, controllers=["points", "motion-ga"])
+    runs = [(spec, replace(RESULT, seconds=30.0 + 50.0 * spec.seed)) for spec in specs_of(table)]
+    gave_up = replace(RESULT, seconds=5.0, targets=RESULT.reached + 1)
+    runs = [(spec, gave_up if spec.seed == 0 and spec.controller == "points" else one) for spec, one in runs]
+    middle, last = shown_seeds(runs).items()
+    assert (middle[0], last[0]) == (2, 0)
+    assert last[1].startswith("1 target not reached, ") and "not reached" not in middle[1]
+
+
 def test_long_names_of_faults_cover_nothing_and_stay_in_the_picture(tmp_path: Path) -> None:
     file = tmp_path / "c.toml"
     long = "; ".join(["link_outage start_s=10 since=driving duration_s=0.8", *2 * ["gps_noise start_s=60 metres=0.2"]])
