@@ -63,11 +63,14 @@ AS_LATE_S = 0.5
 """Those that come within it up to so much earlier count as well."""
 AS_SLOW_M_S = 0.15
 """Speeds at which the two meet that differ by less are equal; then it stops or backs off."""
+AS_MUCH_M = 0.1
+"""What leaves less room by so much counts as well, where the other is near already."""
 GO_ON_S = (math.inf, 3.0, 1.5, 0.4)
 """How long the rover might go on before it stops, the longest first: 0.4 s is longer than to the next tick."""
 ALONE_S = 15.0
 """A rover that is left alone with a position is not met there for so long: another companion may begin then."""
-STRAIGHT_S = 1.0
+STRAIGHT_S = (1.0, 2.5)
+"""How long it drives straight on before it stops, the shortest first; in the longer one it leaves the way of a van."""
 ASIDE_M = (2.5, 1.5)
 ASIDE_RAD = (0.5 * math.pi, -0.5 * math.pi, 0.25 * math.pi, -0.25 * math.pi)
 """How far it may move aside, and in which directions, counted from the course of the other."""
@@ -196,6 +199,9 @@ def _least_bad(options: list[Option], outlook: Outlook, discs: Points, aside_rad
     if any(near.least_m >= 0.0 for _, near in ends):
         return max(ends, key=lambda one: one[1].least_m)[0]
     latest_s = max(near.first_s for _, near in ends)
+    if latest_s == 0.0:  # the other is so near already: when, and how fast now, is the same for all
+        most_m = max(near.least_m for _, near in ends)
+        return min((option for option, near in ends if near.least_m >= most_m - AS_MUCH_M), key=_told_m_s)
     late = [(option, near) for option, near in ends if near.first_s >= latest_s - AS_LATE_S]
     kept = [option for option, _ in late if aside_rad is not None and option.aside_rad == aside_rad]
     if kept:
@@ -401,7 +407,7 @@ def _out_of_the_way(outlook: Outlook, moving: tuple[Moving, ...], aside_rad: flo
     pose = outlook.view.pose
     yield from _straight_on(outlook)
     if aside_rad is not None:
-        yield from _aside(outlook, aside_rad)
+        yield from _aside(outlook, aside_rad, under_way=True)
     nearest = min(moving, key=lambda one: one.at(pose.time_s).distance_m(pose.point) - one.radius_m)
     course_rad = math.atan2(nearest.east_m_s, nearest.north_m_s)
     for turned_rad in ASIDE_RAD:
@@ -409,15 +415,18 @@ def _out_of_the_way(outlook: Outlook, moving: tuple[Moving, ...], aside_rad: flo
     yield from _back_off(outlook)
 
 
-def _straight_on(outlook: Outlook) -> list[Option]:
+def _straight_on(outlook: Outlook) -> Iterator[Option]:
     """Drive straight on, then stop. A new path may turn off in front of something that crosses."""
-    view = outlook.view
-    along_m = outlook.driven_m(view.speed_m_s, STRAIGHT_S)
-    there = view.pose.point.moved(view.pose.heading_rad, float(along_m[-1]))
-    if view.speed_m_s <= view.settings.guidance.roll_out_m_s or not _may_stand(view, there):
-        return []
-    command = ControlCommand(Purpose.LOOK, GuidedPosition(there), view.speed_m_s)
-    return [Option(command, places_ahead(view.pose, along_m))]
+    view, guidance = outlook.view, outlook.guidance
+    if view.speed_m_s <= guidance.roll_out_m_s:
+        return
+    for goes_s in STRAIGHT_S[:1] if outlook.stops else STRAIGHT_S:
+        along_m = outlook.driven_m(view.speed_m_s, goes_s)
+        ahead_m = float(along_m[-1])
+        there = view.pose.point.moved(view.pose.heading_rad, ahead_m)
+        if ahead_m <= farthest_m(view.speed_m_s, guidance, narrow=view.rover.narrow_sight) and _may_stand(view, there):
+            command = ControlCommand(Purpose.LOOK, GuidedPosition(there), view.speed_m_s)
+            yield Option(command, places_ahead(view.pose, along_m))
 
 
 def _may_stand(view: LocalView, there: NedPoint) -> bool:
@@ -429,8 +438,11 @@ def _may_stand(view: LocalView, there: NedPoint) -> bool:
     return min(line.clear_m, line.seen_m) >= reach_m - 0.05
 
 
-def _aside(outlook: Outlook, bearing_rad: float) -> list[Option]:
-    """Turn to a bearing and drive a little, if the ground there is free, and round the rover."""
+def _aside(outlook: Outlook, bearing_rad: float, *, under_way: bool = False) -> list[Option]:
+    """Turn to a bearing and drive a little, if the ground there is free, and round the rover.
+
+    A rover that is ``under_way`` there, and points there, does not stop before it.
+    """
     view, pose, guidance = outlook.view, outlook.view.pose, outlook.view.settings.guidance
     if not may_turn_to(bearing_rad, view):
         return []
@@ -447,6 +459,9 @@ def _aside(outlook: Outlook, bearing_rad: float) -> list[Option]:
         places = moved(places_ahead(pose, outlook.rolls_m), bearing_rad, along_m)
         if error_rad > math.radians(guidance.turn_until_close_deg):
             return [Option(turn_to(bearing_rad, view), places, aside_rad=bearing_rad)]
+        if under_way:
+            along_m = np.minimum(outlook.driven_m(going_m_s, math.inf), aside_m)
+            places = moved(np.tile((pose.north_m, pose.east_m), (len(along_m), 1)), bearing_rad, along_m)
         going = ControlCommand(Purpose.LOOK, GuidedPosition(there), going_m_s)
         return [Option(going, places, aside_rad=bearing_rad)]
     return []

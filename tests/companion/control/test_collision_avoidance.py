@@ -397,3 +397,27 @@ def test_only_where_the_outline_reaches_a_long_rover_is_in_the_way(ahead_m: floa
     at = replace(view(0.0), body=body, rover=RoverLimits(body.radius_m, 2.0, 8.0))
     option = avoided(stop_for(Purpose.BLOCKED), None, at, (crossing(-3.0, 1.2, north_m=21.6),))
     assert option.yields is makes_way
+
+
+def test_in_the_way_of_a_van_and_told_to_look_it_drives_straight_on_out_of_the_way() -> None:
+    """As in `crossing`: it was across the van's way when its beams showed no more; it stopped there, and was hit."""
+    look = ControlCommand(Purpose.LOOK, GuidedHeading(math.radians(-90.0)), 0.5)
+    here = Pose(23.665, 26.997, math.radians(-120.0), 100.0)
+    van = Moving("van", 100.0, NedPoint(28.3, 26.0), -1.5, 0.0, 1.0)
+    option = avoided(look, None, view(0.914, pose=here), (van,))
+    assert isinstance(option.command.setpoint, GuidedPosition)
+    there = option.command.setpoint.point
+    assert here.point.bearing_rad(there) == pytest.approx(here.heading_rad), "straight on"
+    assert 26.0 - there.east_m > 1.0 + ROVER.radius_m, "it stands beside the way of the van"
+
+
+def test_beside_what_is_near_already_it_goes_on_where_that_leaves_more_room() -> None:
+    """As in `crossing`: half out of the way of a cart that said nothing of its size it stopped, and was touched."""
+    here, speed_m_s = Pose(20.7, 20.396, math.radians(50.0), 100.0), 1.0
+    cart = Moving("cart", 100.0, NedPoint(19.33, 19.99), 1.2, 0.0, 1.0)
+    for stops, aside_rad in ((False, None), (True, None), (False, math.radians(45.0))):
+        option = avoided(
+            stop_for(Purpose.BLOCKED), None, view(speed_m_s, pose=here), (cart,), stops=stops, aside_rad=aside_rad
+        )
+        assert isinstance(option.command.setpoint, GuidedPosition), (stops, aside_rad)
+        assert option.command.setpoint.point.east_m > here.east_m + 0.8
