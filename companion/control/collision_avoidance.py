@@ -143,6 +143,7 @@ def avoided(
     *,
     aside_rad: float | None = None,
     stops: bool = False,
+    makes_way: bool = False,
     backwards: bool = False,
     foresees: Foresees | None = None,
     turned_stops: TurnedStops | None = None,
@@ -151,9 +152,9 @@ def avoided(
     """What to do because of what moves, when the controller says ``command``; that command if nothing comes across.
 
     ``line``: what the rover is led along. ``aside_rad``: the bearing to which it moves aside already; it keeps to that.
-    ``stops``: it stops already. ``backwards``: it rolls tail first. ``foresees``: where the rover will be with that
-    command, if it is known better than that it follows the line. ``turned_stops``: how else it may stop;
-    ``turned_rad_s``: it stops so already, and keeps to that side.
+    ``stops``: it stops already; ``makes_way``: it moves off already. ``backwards``: it rolls tail first. ``foresees``:
+    where the rover will be with that command, if it is known better than that it follows the line. ``turned_stops``:
+    how else it may stop; ``turned_rad_s``: it stops so already, and keeps to that side.
     """
     times_s = np.arange(0.0, view.settings.traffic.look_s + 1e-9, PERIOD_S)
     outlook = Outlook(view, times_s, backwards, stops)
@@ -187,7 +188,7 @@ def avoided(
         if room_m(option, HALF_MARGIN) >= 0.0:
             return option
         options.append(option)
-    if stops and view.speed_m_s > view.settings.guidance.roll_out_m_s:
+    if (stops or makes_way) and view.speed_m_s > view.settings.guidance.roll_out_m_s:
         options = [option for option in options if option.yields]
     return _least_bad(options, outlook, discs, aside_rad)
 
@@ -243,7 +244,7 @@ class CollisionAvoidance:
 
     def __init__(self) -> None:
         self._aside_rad: float | None = None
-        self._stops = False
+        self._stops = self._makes_way = False
         self._turned_rad_s = 0.0
         self._since_s: float | None = None
         self._avoided_s = -math.inf
@@ -282,15 +283,16 @@ class CollisionAvoidance:
     ) -> Option:
         """What to do, as ``avoided`` says. Where nothing has moved for ``REMEMBERS_S`` it begins anew."""
         if view.pose.time_s - self._avoided_s > REMEMBERS_S:
-            self._aside_rad, self._stops, self._since_s = None, False, None
+            self._aside_rad, self._stops, self._makes_way, self._since_s = None, False, False, None
         if moving:
             self._avoided_s = view.pose.time_s
         option = avoided(
-            command, line, view, moving, aside_rad=self._aside_rad, stops=self._stops, backwards=backwards,
-            foresees=foresees, turned_stops=turned_stops, turned_rad_s=self._turned_rad_s,
+            command, line, view, moving, aside_rad=self._aside_rad, stops=self._stops, makes_way=self._makes_way,
+            backwards=backwards, foresees=foresees, turned_stops=turned_stops, turned_rad_s=self._turned_rad_s,
         )  # fmt: skip
         self._aside_rad = option.aside_rad
         self._stops = option.yields and option.command.purpose is Purpose.BRAKE
+        self._makes_way = option.yields and not self._stops
         self._turned_rad_s = _turn_rad_s(option) or (self._turned_rad_s if self._stops else 0.0)
         return option
 

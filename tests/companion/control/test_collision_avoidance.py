@@ -421,3 +421,15 @@ def test_beside_what_is_near_already_it_goes_on_where_that_leaves_more_room() ->
         )
         assert isinstance(option.command.setpoint, GuidedPosition), (stops, aside_rad)
         assert option.command.setpoint.point.east_m > here.east_m + 0.8
+
+
+def test_while_it_makes_way_it_does_not_go_on_because_it_might_just_pass() -> None:
+    """As in `crossing`: rolling beside the way of a sweeper, and told to back off, it went on for a moment."""
+    here = Pose(24.14, 22.388, math.radians(-64.0), 100.0)
+    ahead = np.column_stack((np.linspace(24.14, 25.4, 41), np.linspace(22.388, 12.4, 41)))
+    on = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(24.46, 21.82)), 0.75)
+    sweeper = Moving("sweeper", 100.0, NedPoint(25.0, 23.66), 0.0, -0.7, 1.0)
+    at, line = view(0.43, pose=here), ReferencePath(ahead)
+    assert avoided(on, line, at, (sweeper,)).command == on, "for the test to show anything"
+    option = avoided(on, line, at, (sweeper,), makes_way=True)
+    assert option.yields and option.command.setpoint != on.setpoint
