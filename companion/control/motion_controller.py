@@ -355,12 +355,12 @@ def _soonest(view: LocalView) -> int:
 def _pending(view: LocalView, steps: int, step_s: float) -> NDArray[np.float64]:
     """What was told and has not had its effect yet, one row a step.
 
-    Where that was no velocity, the rover goes on as it does; a position tells it to drive on. The leg before may have
-    been a faster one.
+    Where that was no velocity, the rover goes on as it does; a position tells it to drive on, as fast as was told for
+    that; as fast as the mission says where that is not known.
     """
     rows, now_s, on_m_s = np.zeros((steps, 2)), view.pose.time_s, view.forward_m_s
     if view.by_position(now_s - steps * step_s):
-        on_m_s = max(view.rover.cruise_speed_m_s, view.placed_m_s if math.isfinite(view.placed_m_s) else 0.0)
+        on_m_s = view.placed_m_s if math.isfinite(view.placed_m_s) else view.rover.cruise_speed_m_s
     for step, row in enumerate(rows):
         told = in_force(view.lately, now_s + (step + 0.5 - steps) * step_s)
         row[:] = (on_m_s, view.yaw_rate_rad_s) if told is None else (told.speed_m_s, told.turn_rad_s)

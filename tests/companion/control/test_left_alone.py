@@ -326,7 +326,7 @@ def test_its_way_is_as_long_as_physics_makes_it(lasts_s: float) -> None:
     st.floats(0.0, 1.5),
     st.floats(-1.5, 1.5),
     st.sampled_from([0.1, 0.2, 0.33, 0.5]),
-    st.sampled_from([None, math.inf, 3.0]),
+    st.sampled_from([None, math.inf, 3.0, 0.6]),
 )
 def test_it_leads_where_the_planning_thinks_though_reckoned_apart(
     lately: list[tuple[float, float]],
@@ -392,6 +392,8 @@ def test_on_a_slower_leg_planning_and_last_look_count_on_the_speed_that_was_told
     ways = [ways_left_alone(GuidedVelocity(0.5, 0.0), one) for one in (seen, leg)]
     assert ways[0] is not None and ways[1] is not None
     assert all((one == other).all() for one, other in zip(*ways, strict=True))
+    creeps = replace(seen, placed_m_s=0.6)
+    assert set(_pending(creeps, _latest(creeps), ALONE_STEP_S)[:, 0]) == {0.6}, "told to drive there slowly"
 
 
 def test_just_after_a_position_the_rover_still_drives_on() -> None:
