@@ -3,12 +3,14 @@
 Several options are played through: go on, go on a little and then stop, stop at once, turn while it stops, turn and
 move aside, back off, drive off on an arc. The first that keeps its distance is taken; if none does, the one that leaves
 the most room. If all would touch something, those count that go well for longest: the rover goes on to move aside if it
-does so already, else it takes the one with which the two would meet at the lowest speed.
+does so already, else it takes the one with which the two would meet at the lowest speed. Where the other is near
+already, the most room counts that is left from then on.
 
 The rover stops before the way of others, since going on is allowed only while there still is somewhere to stop; and it
 waits there until going on is safe again. Once it stops for something it goes on only for good: else it would drive
-along beside that, always about to pass in front of it. While it still rolls it goes on only where that keeps its
-distance: what is seen to move is not known exactly, and a rover that brakes and goes on in turn does neither in time.
+along beside that, always about to pass in front of it. While it still rolls, stopping or moving off, it goes on only
+where that keeps its distance: what is seen to move is not known exactly, and a rover that brakes and goes on in turn
+does neither in time.
 Of positions that are as good the first is told with which a rover that is left alone is not met, if there is one. Each
 option says what the autopilot would be told and where the rover would then be at each moment; the ground there must be
 clear and seen.

@@ -411,6 +411,16 @@ def test_in_the_way_of_a_van_and_told_to_look_it_drives_straight_on_out_of_the_w
     assert 26.0 - there.east_m > 1.0 + ROVER.radius_m, "it stands beside the way of the van"
 
 
+@pytest.mark.parametrize("speed_m_s", [0.5, 0.914, 1.5, 1.9])
+def test_no_farther_straight_on_than_a_rover_with_thin_beams_may_be_told(speed_m_s: float) -> None:
+    """The last look would refuse it, and tell the rover to stand in the way."""
+    moment = view(speed_m_s, pose=Pose(23.665, 26.997, math.radians(-120.0), 100.0))
+    moment = replace(moment, rover=replace(ROVER, narrow_sight=True))
+    look = ControlCommand(Purpose.LOOK, GuidedHeading(math.radians(-90.0)), 0.5)
+    option = avoided(look, None, moment, (Moving("van", 100.0, NedPoint(28.3, 26.0), -1.5, 0.0, 1.0),))
+    assert fault_of(option.command.setpoint, moment, Bounds()) is None
+
+
 def test_beside_what_is_near_already_it_goes_on_where_that_leaves_more_room() -> None:
     """As in `crossing`: half out of the way of a cart that said nothing of its size it stopped, and was touched."""
     here, speed_m_s = Pose(20.7, 20.396, math.radians(50.0), 100.0), 1.0
