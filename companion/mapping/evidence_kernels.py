@@ -37,7 +37,7 @@ class InverseSensorModel(NamedTuple):
     """How readings change the log-odds. Lengths in evidence cells.
 
     A beam ends ``depth_cells`` behind its range. The last ``kept_cells`` before a hit are not freed. From
-    ``occupied_at`` on a cell is an obstacle.
+    ``occupied_at`` on a cell is an obstacle. A hit is confirmed by an earlier one within ``confirm_cells``.
     """
 
     hit: float
@@ -46,6 +46,7 @@ class InverseSensorModel(NamedTuple):
     free_limit: float
     depth_cells: float
     kept_cells: float
+    confirm_cells: float
     occupied_at: float
 
 
@@ -106,31 +107,60 @@ def _free_cells(log_odds, stamps, stamp, ray, model, turned):
 
 
 @njit(cache=True, nogil=True)
-def cast_scan(log_odds, stamps, stamp, scan, model, protected, stands):
+def _is_confirmed(log_odds, x, y, earlier, model):
+    """Whether one of the ``earlier`` hits ended near a cell. Not where an obstacle is as near: that is what was hit."""
+    if model.confirm_cells <= 0.0:
+        return False
+    height, width = log_odds.shape
+    near, reach = model.confirm_cells * model.confirm_cells, int(math.ceil(model.confirm_cells))
+    for row in range(max(0, y - reach), min(height, y + reach + 1)):
+        for column in range(max(0, x - reach), min(width, x + reach + 1)):
+            beside = (column - x) * (column - x) + (row - y) * (row - y) <= near
+            if beside and log_odds[row, column] >= model.occupied_at:
+                return False
+    for i in range(earlier.shape[0]):
+        aside, ahead = earlier[i, 0] - x, earlier[i, 1] - y
+        if aside * aside + ahead * ahead <= near:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _count_hits(log_odds, stamps, stamp, scan, model, earlier, turned):
+    """Harden the cells in which the beams of a scan end. The box ``turned`` encloses those that become obstacles."""
+    height, width = log_odds.shape
+    for i in range(scan.bearing_rad.size):
+        r = scan.range_cells[i]
+        if not np.isfinite(r):
+            continue
+        angle = scan.heading_rad + scan.bearing_rad[i]
+        x = int(math.floor(scan.x + (r + model.depth_cells) * math.sin(angle)))
+        y = int(math.floor(scan.y + (r + model.depth_cells) * math.cos(angle)))
+        if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
+            stamps[y, x] = stamp
+            before = log_odds[y, x]
+            log_odds[y, x] = min(before + model.hit, model.limit)
+            if log_odds[y, x] < model.occupied_at and _is_confirmed(log_odds, x, y, earlier, model):
+                log_odds[y, x] = min(model.hit, model.limit)
+            if before < model.occupied_at <= log_odds[y, x]:
+                _enclose(turned, x, y)
+
+
+@njit(cache=True, nogil=True)
+def cast_scan(log_odds, stamps, stamp, scan, model, earlier, protected, stands):
     """Add one scan to the evidence, and free the cells where the rover ``stands``: its place, x and y, and its radius.
 
-    The cells ``protected`` are not freed: shape (n, 2), x and y, all of them on the map. Returns the box (first x,
-    first y, last x, last y) of cells that have become obstacles or are none any more; the last before the first for
-    none.
+    ``earlier``: the cells in which readings of earlier scans ended; a hit that one of them confirms counts as on ground
+    that was never seen. The cells ``protected`` are not freed. Both have shape (n, 2), x and y, all of them on the map.
+    Returns the box (first x, first y, last x, last y) of cells that have become obstacles or are none any more; the
+    last before the first for none.
     """
     height, width = log_odds.shape
     turned = np.array((width, height, -1, -1))
     x0, y0, heading_rad, width_rad = scan.x, scan.y, scan.heading_rad, scan.beam_width_rad
     bearing_rad, range_cells = scan.bearing_rad, scan.range_cells
     # Hits first: a cell stamped by a hit cannot be freed by another beam of the same scan.
-    for i in range(bearing_rad.size):
-        r = range_cells[i]
-        if not np.isfinite(r):
-            continue
-        angle = heading_rad + bearing_rad[i]
-        x = int(math.floor(x0 + (r + model.depth_cells) * math.sin(angle)))
-        y = int(math.floor(y0 + (r + model.depth_cells) * math.cos(angle)))
-        if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
-            stamps[y, x] = stamp
-            before = log_odds[y, x]
-            log_odds[y, x] = min(before + model.hit, model.limit)
-            if before < model.occupied_at <= log_odds[y, x]:
-                _enclose(turned, x, y)
+    _count_hits(log_odds, stamps, stamp, scan, model, earlier, turned)
     for i in range(protected.shape[0]):
         stamps[protected[i, 1], protected[i, 0]] = stamp
     for i in range(bearing_rad.size):

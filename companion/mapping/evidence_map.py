@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,10 +104,12 @@ def new_map(base: Grid, rover_radius_m: float, settings: MappingSettings) -> Evi
 def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) -> None:
     """Add one scan to the map; ``stamp`` must differ from scan to scan.
 
-    A beam frees the cells it passed and hardens the one it ended in. In one scan a hit outweighs any number of
-    passes, and each cell changes once. An empty ray of a wired lidar frees nothing if it begins before an obstacle,
-    which may have come too near to be seen. A cell in which another sensor has just seen something is not freed. The
-    ground under the rover is free.
+    A beam frees the cells it passed and hardens the one it ended in. In one scan a hit outweighs any number of passes,
+    and each cell changes once. Of an edge on ground that was seen free a noisy sensor's readings end in different
+    cells, each of which the next scans free again. So a reading near one of the newest second counts as on ground that
+    was never seen, unless an obstacle is as near already: walls would grow thicker. An empty ray of a wired lidar frees
+    nothing if it begins before an obstacle, which may have come too near to be seen. A cell in which another sensor has
+    just seen something is not freed. The ground under the rover is free.
     """
     settings, frame = evidence.settings, evidence.frame
     x, y = frame.xy(pose.point)
@@ -137,12 +139,14 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
             settings.free_limit,
             frame.cells(settings.hit_depth_m),
             frame.cells(kept_m),
+            frame.cells(settings.confirm_m),
             settings.occupied_at,
         ),
+        evidence.agreement.before(scan),
         evidence.agreement.others(scan),
         (x, y, frame.cells(evidence.rover_radius_m)),
     )
-    evidence.agreement.note(scan, partial(_hit_cells, evidence, pose, scan))
+    evidence.agreement.note(scan, _hit_cells(evidence, pose, scan))
     left, low, right, high = (int(cell) // evidence.subdivisions for cell in turned)
     if left <= right:
         # Weights follow from which cells are obstacles: most scans change that of few.

@@ -1,4 +1,6 @@
-"""Sensor agreement: the cells in which a sensor has just seen something, which no other sensor may free.
+"""Sensor agreement: the cells in which a sensor has just seen something.
+
+No other sensor may free them, and they confirm what is seen beside them.
 
 Nouns: sensor agreement.
 """
@@ -6,8 +8,7 @@ Nouns: sensor agreement.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,24 +16,21 @@ from numpy.typing import NDArray
 from companion.core.scan import RangeScan
 
 BELIEVED_S = 1.0
-"""For this long after a reading only its own sensor may free the cell again: the slowest in use send once a second."""
+"""For this long a reading counts, and only its own sensor may free the cell again: the slowest in use send once a
+second."""
 NONE = np.empty((0, 2), np.int64)
 
 Cells = NDArray[np.int64]
 """Evidence cells, shape (n, 2): x and y."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class _Hits:
-    """Those of one scan. Most rovers have one sensor, and none of their cells is ever asked for."""
+    """Those of one scan."""
 
-    def __init__(self, scan: RangeScan, find: Callable[[], Cells]) -> None:
-        self.time_s, self.voice = scan.time_s, scan.voice
-        self._find = find
-
-    @cached_property
-    def cells(self) -> Cells:
-        """Where they are."""
-        return self._find()
+    time_s: float
+    voice: tuple[int, str]
+    cells: Cells
 
 
 class SensorAgreement:
@@ -41,16 +39,23 @@ class SensorAgreement:
     def __init__(self) -> None:
         self._seen: deque[_Hits] = deque()
 
-    def note(self, scan: RangeScan, find: Callable[[], Cells]) -> None:
-        """One more scan. ``find`` tells in which cells its readings have ended, also later."""
-        self._seen.append(_Hits(scan, find))
+    def note(self, scan: RangeScan, cells: Cells) -> None:
+        """One more scan, and the cells in which its readings have ended."""
+        while self._seen and self._seen[0].time_s < scan.time_s - BELIEVED_S:
+            self._seen.popleft()
+        self._seen.append(_Hits(scan.time_s, scan.voice, cells))
+
+    def before(self, scan: RangeScan) -> Cells:
+        """The cells in which any sensor has just seen something."""
+        return self._of(scan, own=True)
 
     def others(self, scan: RangeScan) -> Cells:
         """The cells in which other sensors than the one of this scan have just seen something."""
-        while self._seen and self._seen[0].time_s < scan.time_s - BELIEVED_S:
-            self._seen.popleft()
-        own = scan.voice
-        cells = [hits.cells for hits in self._seen if hits.voice != own]
+        return self._of(scan, own=False)
+
+    def _of(self, scan: RangeScan, own: bool) -> Cells:
+        since_s = scan.time_s - BELIEVED_S
+        cells = [hits.cells for hits in self._seen if hits.time_s >= since_s and (own or hits.voice != scan.voice)]
         return np.concatenate(cells) if cells else NONE
 
     def clear(self) -> None:

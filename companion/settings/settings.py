@@ -93,6 +93,14 @@ class MappingSettings(Section):
         description="a single thin beam does not free the ground this close to its end: it sees a wall once or twice, "
         "and as the position drifts, later passes would erase the wall",
     )
+    confirm_m: float = Field(
+        0.15,
+        ge=0.0,
+        le=0.5,
+        description="a reading on ground that was seen free counts as much as elsewhere if another of the last second "
+        "ended this near, and no obstacle is as near: of an edge a noisy sensor's readings end in different cells. "
+        "0: never",
+    )
     soft_cost: float = Field(0.4, ge=0.0, lt=0.5, description="weight added beside obstacles")
     soft_reach_m: float = Field(2.0, ge=0.0, description="how far from an obstacle the soft cost reaches")
     max_yaw_rate_deg_s: float = Field(120.0, gt=0.0, description="scans taken while turning faster are dropped")

@@ -12,12 +12,14 @@ from sitl.cli.commands import app
 
 FOUND = Path(__file__).resolve().parents[2] / "missions" / "campaigns" / "found"
 RUNS = {"settings-together": 8, "rough-corner": 3, "rough-house": 2, "late-ranges": 4, "reboot-while-turning": 4,
-        "map-before-age": 4, "position-astray": 8, "stuck-sensor": 1, "refused-stop": 1}  # fmt: skip
+        "map-before-age": 4, "position-astray": 8, "stuck-sensor": 1, "refused-stop": 1,
+        "noisy-dropouts": 5, "noisy-yard": 1, "many-dropouts": 1, "late-noisy-ranges": 2}  # fmt: skip
 UNREACHABLE = ("rough-corner", "rough-house")
 """There is no way to the target, and that is to be said."""
 MOST_S = {"settings-together": 120.0, "rough-corner": 300.0, "rough-house": 400.0, "late-ranges": 150.0,
           "reboot-while-turning": 150.0, "map-before-age": 100.0, "position-astray": 60.0,
-          "stuck-sensor": 120.0, "refused-stop": 40.0}  # fmt: skip
+          "stuck-sensor": 120.0, "refused-stop": 40.0, "noisy-dropouts": 60.0,
+          "noisy-yard": 60.0, "many-dropouts": 90.0, "late-noisy-ranges": 150.0}  # fmt: skip
 """Of a run: at the rough corner the rover went to and fro for minutes."""
 
 

@@ -24,7 +24,7 @@ from companion.mapping.evidence_kernels import (
 
 SIZE, S = 48, 8
 MODEL = InverseSensorModel(
-    hit=0.8, miss=0.3, limit=3.0, free_limit=2.0, depth_cells=0.4, kept_cells=0.0, occupied_at=0.5
+    hit=0.8, miss=0.3, limit=3.0, free_limit=2.0, depth_cells=0.4, kept_cells=0.0, confirm_cells=3.0, occupied_at=0.5
 )
 NOTHING = np.empty((0, 2), np.int64)
 CELLS = st.sets(st.tuples(st.integers(0, SIZE - 1), st.integers(0, SIZE - 1)), max_size=20)
@@ -51,6 +51,7 @@ def cast(range_cells: float, protected: np.ndarray = NOTHING, kept_cells: float 
             np.int32(stamp),
             scan,
             MODEL._replace(kept_cells=kept_cells),
+            NOTHING,
             protected,
             (scan.x, scan.y, 1.0),
         )
@@ -79,6 +80,32 @@ def test_protected_cells_and_the_last_ones_before_a_hit_are_not_freed() -> None:
     log_odds = cast(10.0, np.array([[24, 28]]), kept_cells=3.0)
     assert log_odds[28, 24] == 0.0 and log_odds[27, 24] < 0.0
     assert (log_odds[32:34, 24] == 0.0).all() and log_odds[30, 24] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("earlier", "obstacle", "confirm_cells", "confirmed"),
+    [
+        ([(26, 36)], None, 3.0, True),
+        ([(3, 3), (24, 34)], None, 3.0, True),
+        ([(27, 35)], None, 3.0, False),
+        ([], None, 3.0, False),
+        ([(26, 36)], (22, 34), 3.0, False),
+        ([(26, 36)], (22, 31), 3.0, True),
+        ([(24, 34)], None, 0.0, False),
+    ],
+    ids=["near", "same", "far", "none", "known", "another", "never"],
+)
+def test_on_ground_seen_free_a_hit_counts_at_once_where_an_earlier_one_ended_near(
+    earlier: list[tuple[int, int]], obstacle: tuple[int, int] | None, confirm_cells: float, confirmed: bool
+) -> None:
+    """Unless there is an obstacle already: that is what was hit."""
+    log_odds, stamps = raster(() if obstacle is None else [obstacle]), np.zeros((SIZE, SIZE), np.int32)
+    scan = ScanInCells(24.5, 24.5, 0.0, np.zeros(1), np.array([10.0]), 16.0, 0.05)
+    cells = np.array(earlier, np.int64).reshape(-1, 2)
+    model = MODEL._replace(confirm_cells=confirm_cells)
+    turned = cast_scan(log_odds, stamps, np.int32(1), scan, model, cells, NOTHING, (scan.x, scan.y, 1.0))
+    assert log_odds[34, 24] == pytest.approx(MODEL.hit if confirmed else -1.0 + MODEL.hit)
+    assert turned.tolist() == ([24, 34, 24, 34] if confirmed else [SIZE, SIZE, -1, -1])
 
 
 @settings(deadline=None)
